@@ -1,0 +1,16 @@
+//! The mathematics that precomputed light transport methods share: matrices and products,
+//! decompositions, spherical harmonics, form factors, sampling, meshes, ray casting and the
+//! binary container. Nothing here knows which method uses it.
+//!
+//! Units: lengths in metres where a unit is needed, angles in radians, irradiance in W/m² per
+//! colour channel. Axes are right-handed with +Y up. Bakes use `f64` and only operations whose
+//! bits do not depend on the machine; see `docs/CONVENTIONS.md`.
+
+pub mod block_sparse;
+pub mod cube;
+pub mod form_factor;
+pub mod hexahedron;
+pub mod matrix;
+pub mod parity;
+#[cfg(feature = "svd")]
+pub mod svd;

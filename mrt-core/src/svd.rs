@@ -1,0 +1,175 @@
+//! Truncated singular value decomposition in `f64`, through nalgebra, and the energy bookkeeping.
+//!
+//! A decomposition has the same bits on every machine: nalgebra is built without its run-time
+//! choice of instruction set, vectors are ordered by falling singular value, and signs are fixed.
+
+use crate::matrix::{Matrix, MatrixView, Scalar};
+use nalgebra::{DMatrix, DVector};
+
+/// A thin decomposition `a = u * diag(singular_values) * vᵀ`, largest value first.
+#[derive(Clone, Debug)]
+pub struct Svd {
+    /// Left singular vectors, one a column.
+    pub u: Matrix<f64>,
+    /// Falling and not negative.
+    pub singular_values: Vec<f64>,
+    /// Right singular vectors, one a column.
+    pub v: Matrix<f64>,
+}
+
+/// Thin SVD of any matrix; each column of `u` has its largest entry positive (the first of equals).
+///
+/// Cost: about `20 * m * n * min(m, n)` operations. Relative to the largest singular value errors are
+/// near 1e-15.
+pub fn svd(a: MatrixView<f64>) -> Svd {
+    let (rows, columns) = (a.rows(), a.columns());
+    let rank = rows.min(columns);
+    if rank == 0 {
+        return Svd {
+            u: Matrix::zeros(rows, 0),
+            singular_values: Vec::new(),
+            v: Matrix::zeros(columns, 0),
+        };
+    }
+    let full = DMatrix::from_column_slice(rows, columns, a.data()).svd(true, true);
+    let (u, v_t) = (
+        full.u.unwrap_or_else(|| DMatrix::zeros(rows, rank)),
+        full.v_t.unwrap_or_else(|| DMatrix::zeros(rank, columns)),
+    );
+    let mut order: Vec<usize> = (0..rank).collect();
+    order.sort_by(|&i, &j| full.singular_values[j].total_cmp(&full.singular_values[i]));
+    let signs: Vec<f64> = order
+        .iter()
+        .map(|&k| largest_entry_sign(u.column(k).as_slice()))
+        .collect();
+    Svd {
+        u: Matrix::from_fn(rows, rank, |i, j| u[(i, order[j])] * signs[j]),
+        singular_values: order.iter().map(|&k| full.singular_values[k]).collect(),
+        v: Matrix::from_fn(columns, rank, |i, j| v_t[(order[j], i)] * signs[j]),
+    }
+}
+
+/// Eigenvalues, falling, and eigenvectors of a symmetric matrix (only its lower triangle is read).
+///
+/// For a tall matrix this is the cheap road to its right singular vectors (method of snapshots): the
+/// eigenvalues of `aᵀa` are squared singular values, good down to 1e-7 of the largest.
+pub fn symmetric_eigen(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
+    let size = a.rows();
+    assert_eq!(size, a.columns(), "a symmetric matrix is square");
+    if size == 0 {
+        return (Vec::new(), Matrix::zeros(0, 0));
+    }
+    let eigen = DMatrix::from_column_slice(size, size, a.data()).symmetric_eigen();
+    let mut order: Vec<usize> = (0..size).collect();
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+    let vectors = Matrix::from_fn(size, size, |i, j| eigen.eigenvectors[(i, order[j])]);
+    let values = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
+    (values, vectors)
+}
+
+/// Largest magnitude of the eigenvalues of a square matrix, by its real Schur form.
+pub fn spectral_radius(a: MatrixView<f64>) -> f64 {
+    assert_eq!(a.rows(), a.columns(), "a square matrix has eigenvalues");
+    let matrix = DMatrix::from_column_slice(a.rows(), a.columns(), a.data());
+    let eigenvalues: DVector<_> = matrix.complex_eigenvalues();
+    eigenvalues
+        .iter()
+        .map(|value| libm::hypot(value.re, value.im))
+        .fold(0.0, f64::max)
+}
+
+/// Number of leading singular values whose squares hold at least `fraction` of the sum of squares.
+pub fn energy_rank(singular_values: &[f64], fraction: f64) -> usize {
+    let total: f64 = singular_values.iter().map(|s| s * s).sum();
+    let mut held = 0.0;
+    for (k, s) in singular_values.iter().enumerate() {
+        held += s * s;
+        if held >= fraction * total {
+            return k + 1;
+        }
+    }
+    singular_values.len()
+}
+
+/// Fraction of the sum of squares beyond the first `kept` values, in [0, 1].
+pub fn dropped_energy(singular_values: &[f64], kept: usize) -> f64 {
+    let total: f64 = singular_values.iter().map(|s| s * s).sum();
+    let dropped: f64 = singular_values.iter().skip(kept).map(|s| s * s).sum();
+    if total > 0.0 { dropped / total } else { 0.0 }
+}
+
+/// +1 or -1, the sign of the entry of largest magnitude.
+///
+/// Entries within rounding of the largest tie, and the first of them decides: symmetric vectors have
+/// many equal magnitudes.
+pub fn largest_entry_sign<T: Scalar>(column: &[T]) -> f64 {
+    let largest = column
+        .iter()
+        .fold(0.0f64, |largest, x| largest.max(x.to_f64().abs()));
+    let threshold = largest * (1.0 - 1e-6);
+    match column.iter().find(|x| x.to_f64().abs() >= threshold) {
+        Some(x) if x.to_f64() < 0.0 => -1.0,
+        _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::matrix::{multiply, transpose_multiply};
+
+    fn sample(rows: usize, columns: usize) -> Matrix<f64> {
+        // Rank two plus a small full-rank part: spread-out and close singular values together.
+        Matrix::from_fn(rows, columns, |i, j| {
+            let (x, y) = (i as f64 + 1.0, j as f64 + 2.0);
+            (x * 0.3).sin() * y + x * 0.01 * (y * 1.7).cos() + 1e-3 * ((i * 7 + j * 13) % 5) as f64
+        })
+    }
+
+    fn assert_close(a: &Matrix<f64>, b: &Matrix<f64>, tolerance: f64) {
+        for (x, y) in a.data().iter().zip(b.data()) {
+            assert!((x - y).abs() <= tolerance, "{x} against {y}");
+        }
+    }
+
+    #[test]
+    fn full_rank_equals_the_matrix() {
+        for (rows, columns) in [(30, 12), (12, 30), (9, 9), (1, 5)] {
+            let a = sample(rows, columns);
+            let svd = svd(a.view());
+            let us = svd.u.scaled_columns(&svd.singular_values);
+            let back = multiply(us.view(), svd.v.transposed().view());
+            // 1e-15 relative to the largest singular value, times the dimension.
+            assert_close(&back, &a, 1e-13 * svd.singular_values[0]);
+            let rank = rows.min(columns);
+            let eye = Matrix::identity(rank);
+            assert_close(&transpose_multiply(svd.u.view(), svd.u.view()), &eye, 1e-12);
+            assert_close(&transpose_multiply(svd.v.view(), svd.v.view()), &eye, 1e-12);
+            assert!(svd.singular_values.windows(2).all(|w| w[0] >= w[1]));
+        }
+    }
+
+    #[test]
+    fn gram_eigenvalues_are_squared_singular_values() {
+        let a = sample(40, 8);
+        let (values, _) = symmetric_eigen(transpose_multiply(a.view(), a.view()).view());
+        let svd = svd(a.view());
+        for (value, s) in values.iter().zip(&svd.singular_values) {
+            assert!((value - s * s).abs() < 1e-13 * values[0]);
+        }
+    }
+
+    #[test]
+    fn radius_of_a_scaled_rotation_is_its_scale() {
+        let a = Matrix::from_column_major(2, 2, vec![0.0, 0.8, -0.8, 0.0]);
+        assert!((spectral_radius(a.view()) - 0.8).abs() < 1e-14);
+    }
+
+    #[test]
+    fn energy_counts_squares() {
+        let s = [3.0, 2.0, 1.0];
+        assert_eq!(energy_rank(&s, 9.0 / 14.0), 1);
+        assert_eq!(energy_rank(&s, 0.9), 2);
+        assert!((dropped_energy(&s, 2) - 1.0 / 14.0).abs() < 1e-15);
+    }
+}
