@@ -1,1 +1,1 @@
-//! mrt-dictionary
+//! bakes

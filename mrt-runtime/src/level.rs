@@ -1,0 +1,404 @@
+//! What a designer edits: warped blocks and the openings through which they are joined.
+
+use crate::shape::Shape;
+use glam::{DVec3, Vec3};
+use mrt_core::cube::{CubeRotation, Face};
+use mrt_core::hexahedron::{Hexahedron, HexahedronError};
+
+/// More blocks than this are refused: a level of that size is a mistake or an attack.
+pub const MAX_BLOCKS: usize = 100_000;
+
+/// Corners of joined faces must meet within this fraction of the block's diagonal.
+pub const JOIN_TOLERANCE: f64 = 1e-3;
+
+/// Blocks may enter each other by this fraction of their smaller diagonal before they overlap.
+pub const OVERLAP_TOLERANCE: f64 = 1e-2;
+
+/// A level: blocks and their connections.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Level {
+    /// In the order in which results are given.
+    pub blocks: Vec<Block>,
+    /// Openings that lead into one another. An opening without a connection leads outside: light
+    /// leaves through it, and directional lights shine in.
+    pub connections: Vec<Connection>,
+}
+
+/// One instance of a canonical shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Block {
+    /// The canonical shape.
+    pub shape: &'static Shape,
+    /// Turns the canonical shape in the unit cube before it is warped.
+    pub orientation: CubeRotation,
+    /// The unit cube's corners in the world, metres.
+    pub warp: Hexahedron,
+    /// Linear RGB albedo in [0, 1] of each face of the turned cube, in the order of [`Face::ALL`];
+    /// entries of openings have no meaning.
+    pub albedo: [Vec3; 6],
+}
+
+/// One end of a connection: a face of a block's turned cube.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Opening {
+    /// Index into [`Level::blocks`].
+    pub block: usize,
+    /// The face after orientation.
+    pub face: Face,
+}
+
+/// Two openings that are one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Connection {
+    /// One side.
+    pub a: Opening,
+    /// The other side.
+    pub b: Opening,
+}
+
+/// What is wrong with a level.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LevelError {
+    /// No block at all.
+    #[error("the level has no block; expected at least one")]
+    Empty,
+    /// Above [`MAX_BLOCKS`].
+    #[error("the level has {found} blocks; expected at most {expected}")]
+    TooManyBlocks {
+        /// [`MAX_BLOCKS`].
+        expected: usize,
+        /// Blocks in the level.
+        found: usize,
+    },
+    /// The eight corners are not the image of a cube.
+    #[error("block {block}: {source}")]
+    Warp {
+        /// Which block.
+        block: usize,
+        /// What is wrong with it.
+        source: HexahedronError,
+    },
+    /// An albedo is NaN, negative or above one.
+    #[error("block {block}, face {face}: albedo {found}; expected three values in [0, 1]")]
+    Albedo {
+        /// Which block.
+        block: usize,
+        /// Which face.
+        face: Face,
+        /// The albedo there.
+        found: Vec3,
+    },
+    /// A connection names a block that is not there.
+    #[error("connection {connection}: block {found}; expected an index below {expected}")]
+    NoSuchBlock {
+        /// Which connection.
+        connection: usize,
+        /// Number of blocks.
+        expected: usize,
+        /// The index given.
+        found: usize,
+    },
+    /// A connection names a face that is a wall.
+    #[error(
+        "connection {connection}: face {face} of block {block} is a wall of shape `{shape}` in its \
+         orientation; expected an opening"
+    )]
+    NotAnOpening {
+        /// Which connection.
+        connection: usize,
+        /// Which block.
+        block: usize,
+        /// Which face of it.
+        face: Face,
+        /// Its shape.
+        shape: &'static str,
+    },
+    /// An opening is connected more than once, or to itself.
+    #[error("opening {face} of block {block} is in {found} connections; expected at most one")]
+    ConnectedTwice {
+        /// Which block.
+        block: usize,
+        /// Which face of it.
+        face: Face,
+        /// Connections that name it.
+        found: usize,
+    },
+    /// The corners of two joined faces are in different places.
+    #[error(
+        "face {face} of block {block} and face {other_face} of block {other}: corners are up to \
+         {found:.4} m apart; expected at most {expected:.4} m"
+    )]
+    InterfaceMismatch {
+        /// One block.
+        block: usize,
+        /// Its face.
+        face: Face,
+        /// The other block.
+        other: usize,
+        /// Its face.
+        other_face: Face,
+        /// Largest distance accepted, metres.
+        expected: f64,
+        /// Largest distance between corners that should meet, metres.
+        found: f64,
+    },
+    /// Two blocks share a volume.
+    #[error("blocks {a} and {b} overlap by {found:.4} m; expected at most {expected:.4} m")]
+    Overlap {
+        /// One block.
+        a: usize,
+        /// The other.
+        b: usize,
+        /// Largest depth accepted, metres.
+        expected: f64,
+        /// Depth along the direction that separates them best, metres.
+        found: f64,
+    },
+}
+
+impl Block {
+    /// A block with the same albedo on all faces.
+    pub fn new(
+        shape: &'static Shape,
+        orientation: CubeRotation,
+        warp: Hexahedron,
+        albedo: Vec3,
+    ) -> Self {
+        Self {
+            shape,
+            orientation,
+            warp,
+            albedo: [albedo; 6],
+        }
+    }
+
+    /// True when the face of the turned cube is missing.
+    pub fn is_open(&self, face: Face) -> bool {
+        self.shape.is_open(self.orientation.inverse().face(face))
+    }
+
+    /// The warp as a map from the *canonical* cube: orientation and corners in one.
+    pub fn canonical_warp(&self) -> Hexahedron {
+        Hexahedron {
+            corners: std::array::from_fn(|k| {
+                let turned = self.orientation.point(Hexahedron::unit_corner(k));
+                self.warp.corners[corner_index(turned)]
+            }),
+        }
+    }
+}
+
+/// Index of a corner of the unit cube: x is bit 0, y bit 1, z bit 2.
+pub(crate) fn corner_index(unit: DVec3) -> usize {
+    (0..3)
+        .filter(|&axis| unit[axis] > 0.5)
+        .map(|axis| 1 << axis)
+        .sum()
+}
+
+impl Level {
+    /// One unit block a cell [x, x+1] x [y, y+1] x [z, z+1]; cells that share a face are joined.
+    ///
+    /// # Errors
+    /// [`CellsError`] when a cell is given twice, or opens upwards or downwards, which none of the
+    /// [`SHAPES`](crate::shape::SHAPES) does.
+    pub fn from_cells(cells: &[[i32; 3]], albedo: Vec3) -> Result<Level, CellsError> {
+        let mut index = std::collections::HashMap::new();
+        for (block, &cell) in cells.iter().enumerate() {
+            if let Some(first) = index.insert(cell, block) {
+                return Err(CellsError::Twice {
+                    cell,
+                    first,
+                    second: block,
+                });
+            }
+        }
+        let mut level = Level::default();
+        for (block, &cell) in cells.iter().enumerate() {
+            let neighbour = |face: Face| {
+                let step = face.outward().as_ivec3().to_array();
+                let next = std::array::from_fn(|axis| cell[axis].checked_add(step[axis]));
+                match next {
+                    [Some(x), Some(y), Some(z)] => index.get(&[x, y, z]).copied(),
+                    _ => None,
+                }
+            };
+            let open: Vec<Face> = Face::ALL
+                .into_iter()
+                .filter(|&face| neighbour(face).is_some())
+                .collect();
+            let (shape, orientation) =
+                shape_with_openings(&open).ok_or_else(|| CellsError::NoShape {
+                    cell,
+                    openings: open.iter().map(|face| face.name()).collect(),
+                })?;
+            let min = DVec3::from_array(cell.map(f64::from));
+            let warp = Hexahedron::cell(min);
+            level
+                .blocks
+                .push(Block::new(shape, orientation, warp, albedo));
+            for &face in open.iter().filter(|face| face.is_positive()) {
+                if let Some(other) = neighbour(face) {
+                    level.connections.push(Connection {
+                        a: Opening { block, face },
+                        b: Opening {
+                            block: other,
+                            face: face.opposite(),
+                        },
+                    });
+                }
+            }
+        }
+        Ok(level)
+    }
+
+    /// The opening that each face of each block is connected to, as `[block][face]`.
+    ///
+    /// Connections must be in range; [`Level::check`] says so.
+    pub fn neighbours(&self) -> Vec<[Option<Opening>; 6]> {
+        let mut neighbours = vec![[None; 6]; self.blocks.len()];
+        for connection in &self.connections {
+            let (a, b) = (connection.a, connection.b);
+            neighbours[a.block][a.face.index()] = Some(b);
+            neighbours[b.block][b.face.index()] = Some(a);
+        }
+        neighbours
+    }
+
+    /// Checks everything that assembly and the frame rely on.
+    ///
+    /// # Errors
+    /// The first [`LevelError`] found, blocks before connections before overlaps.
+    pub fn check(&self) -> Result<(), LevelError> {
+        let count = self.blocks.len();
+        if count == 0 {
+            return Err(LevelError::Empty);
+        }
+        if count > MAX_BLOCKS {
+            return Err(LevelError::TooManyBlocks {
+                expected: MAX_BLOCKS,
+                found: count,
+            });
+        }
+        for (index, block) in self.blocks.iter().enumerate() {
+            block.warp.check().map_err(|source| LevelError::Warp {
+                block: index,
+                source,
+            })?;
+            for face in Face::ALL {
+                let albedo = block.albedo[face.index()];
+                let legal = albedo.to_array().iter().all(|a| (0.0..=1.0).contains(a));
+                if !legal {
+                    return Err(LevelError::Albedo {
+                        block: index,
+                        face,
+                        found: albedo,
+                    });
+                }
+            }
+        }
+        self.check_connections()?;
+        crate::overlap::check(self)
+    }
+
+    fn check_connections(&self) -> Result<(), LevelError> {
+        let mut uses = vec![[0usize; 6]; self.blocks.len()];
+        for (connection, ends) in self.connections.iter().enumerate() {
+            for end in [ends.a, ends.b] {
+                let block = self
+                    .blocks
+                    .get(end.block)
+                    .ok_or(LevelError::NoSuchBlock {
+                        connection,
+                        expected: self.blocks.len(),
+                        found: end.block,
+                    })?;
+                if !block.is_open(end.face) {
+                    return Err(LevelError::NotAnOpening {
+                        connection,
+                        block: end.block,
+                        face: end.face,
+                        shape: block.shape.name,
+                    });
+                }
+                let uses = &mut uses[end.block][end.face.index()];
+                *uses += 1;
+                if *uses > 1 {
+                    return Err(LevelError::ConnectedTwice {
+                        block: end.block,
+                        face: end.face,
+                        found: *uses,
+                    });
+                }
+            }
+            self.check_interface(ends)?;
+        }
+        Ok(())
+    }
+
+    /// Each corner of one face must be near a corner of the other.
+    fn check_interface(&self, ends: &Connection) -> Result<(), LevelError> {
+        let warp = |end: Opening| &self.blocks[end.block].warp;
+        let corners = |end: Opening| warp(end).face_corners(end.face);
+        let (ours, theirs) = (corners(ends.a), corners(ends.b));
+        let gap = |from: &[DVec3; 4], to: &[DVec3; 4]| {
+            from.iter()
+                .map(|&p| to.iter().map(|&q| p.distance(q)).fold(f64::MAX, f64::min))
+                .fold(0.0, f64::max)
+        };
+        let found = gap(&ours, &theirs).max(gap(&theirs, &ours));
+        let size = warp(ends.a).diagonal().min(warp(ends.b).diagonal());
+        let expected = JOIN_TOLERANCE * size;
+        if found > expected {
+            return Err(LevelError::InterfaceMismatch {
+                block: ends.a.block,
+                face: ends.a.face,
+                other: ends.b.block,
+                other_face: ends.b.face,
+                expected,
+                found,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// Why cells are not a level.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CellsError {
+    /// The same cell twice.
+    #[error("cell {cell:?} stands at positions {first} and {second}; expected once")]
+    Twice {
+        /// The cell.
+        cell: [i32; 3],
+        /// First position.
+        first: usize,
+        /// Second position.
+        second: usize,
+    },
+    /// No shape has these openings.
+    #[error(
+        "cell {cell:?} opens towards {openings:?}; the dictionary's shapes open only sideways \
+         (-x, +x, -z, +z)"
+    )]
+    NoShape {
+        /// The cell.
+        cell: [i32; 3],
+        /// Faces shared with other cells.
+        openings: Vec<&'static str>,
+    },
+}
+
+/// The shape and the rotation about +Y that leave exactly these faces open.
+pub fn shape_with_openings(open: &[Face]) -> Option<(&'static Shape, CubeRotation)> {
+    crate::shape::SHAPES.iter().find_map(|shape| {
+        (0..4).map(CubeRotation::about_y).find_map(|rotation| {
+            let fits = shape.openings.len() == open.len()
+                && shape
+                    .openings
+                    .iter()
+                    .all(|&face| open.contains(&rotation.face(face)));
+            fits.then_some((shape, rotation))
+        })
+    })
+}
