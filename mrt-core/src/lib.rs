@@ -7,10 +7,17 @@
 //! bits do not depend on the machine; see `docs/CONVENTIONS.md`.
 
 pub mod block_sparse;
+#[cfg(feature = "bvh")]
+pub mod bvh;
+pub mod container;
 pub mod cube;
 pub mod form_factor;
 pub mod hexahedron;
 pub mod matrix;
+pub mod mesh;
 pub mod parity;
+pub mod radiometry;
+pub mod sampling;
+pub mod sh;
 #[cfg(feature = "svd")]
 pub mod svd;

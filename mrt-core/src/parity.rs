@@ -11,7 +11,7 @@ use crate::matrix::Matrix;
 #[derive(Clone, Debug)]
 pub struct ParityClasses {
     point_count: usize,
-    mirror_count: usize,
+    mirrors: Vec<Vec<u32>>,
     /// Each orbit lists (point, group element that takes the first point there).
     orbits: Vec<Vec<(u32, u32)>>,
     /// For each class, the orbits that carry a signal of that parity.
@@ -39,15 +39,6 @@ impl ParityClasses {
             }
         }
         let group_size = 1u32 << mirrors.len();
-        let image = |element: u32, point: usize| {
-            let mut at = point as u32;
-            for (bit, mirror) in mirrors.iter().enumerate() {
-                if element >> bit & 1 == 1 {
-                    at = mirror[at as usize];
-                }
-            }
-            at
-        };
         let mut seen = vec![false; point_count];
         let mut orbits = Vec::new();
         let mut members = vec![Vec::new(); group_size as usize];
@@ -58,7 +49,7 @@ impl ParityClasses {
             let mut orbit: Vec<(u32, u32)> = Vec::new();
             let mut stabilizer = Vec::new();
             for element in 0..group_size {
-                let at = image(element, point);
+                let at = image(mirrors, element, point as u32);
                 if at as usize == point {
                     stabilizer.push(element);
                 }
@@ -77,7 +68,7 @@ impl ParityClasses {
         }
         Self {
             point_count,
-            mirror_count: mirrors.len(),
+            mirrors: mirrors.to_vec(),
             orbits,
             members,
         }
@@ -85,7 +76,7 @@ impl ParityClasses {
 
     /// Number of classes, 2^mirrors.
     pub fn class_count(&self) -> usize {
-        1 << self.mirror_count
+        1 << self.mirrors.len()
     }
 
     /// Number of points.
@@ -96,6 +87,16 @@ impl ParityClasses {
     /// Coordinates that a signal has in a class; over all classes they add up to the points.
     pub fn dimension(&self, class: usize) -> usize {
         self.members[class].len()
+    }
+
+    /// The orbits of the mirrors; each lists (point, group element that takes its first point there).
+    pub fn orbits(&self) -> impl Iterator<Item = &[(u32, u32)]> {
+        self.orbits.iter().map(Vec::as_slice)
+    }
+
+    /// Where a group element takes a point; bit k of the element says whether mirror k takes part.
+    pub fn image(&self, element: u32, point: u32) -> u32 {
+        image(&self.mirrors, element, point)
     }
 
     /// +1 or -1: how signals of `class` change under mirror number `mirror`.
@@ -148,6 +149,14 @@ impl ParityClasses {
             .collect();
         Matrix::from_columns(self.point_count, &columns)
     }
+}
+
+fn image(mirrors: &[Vec<u32>], element: u32, point: u32) -> u32 {
+    mirrors
+        .iter()
+        .enumerate()
+        .filter(|(bit, _)| element >> bit & 1 == 1)
+        .fold(point, |at, (_, mirror)| mirror[at as usize])
 }
 
 /// The character of `class` at a group element: -1 for each mirror that is in both.

@@ -1,0 +1,71 @@
+//! The types of number that sections hold.
+
+/// Type of a section's elements; the discriminant is the code in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ElementType {
+    /// Bytes with no meaning here.
+    Bytes = 0,
+    /// UTF-8.
+    Text = 1,
+    /// 16-bit unsigned integers, or the bits of half-precision numbers.
+    U16 = 2,
+    /// 32-bit unsigned integers.
+    U32 = 3,
+    /// 64-bit unsigned integers.
+    U64 = 4,
+    /// IEEE single precision.
+    F32 = 5,
+    /// IEEE double precision.
+    F64 = 6,
+}
+
+impl ElementType {
+    pub(super) const ALL: [ElementType; 7] = [
+        ElementType::Bytes,
+        ElementType::Text,
+        ElementType::U16,
+        ElementType::U32,
+        ElementType::U64,
+        ElementType::F32,
+        ElementType::F64,
+    ];
+
+    /// Bytes an element.
+    pub const fn size(self) -> usize {
+        match self {
+            ElementType::Bytes | ElementType::Text => 1,
+            ElementType::U16 => 2,
+            ElementType::U32 | ElementType::F32 => 4,
+            ElementType::U64 | ElementType::F64 => 8,
+        }
+    }
+}
+
+/// A number that sections hold: `u16`, `u32`, `u64`, `f32` or `f64`.
+pub trait Element: Copy {
+    /// Its code in the table.
+    const TYPE: ElementType;
+    /// Appends its bytes.
+    fn write_to(self, bytes: &mut Vec<u8>);
+    /// From exactly [`ElementType::size`] bytes; from fewer or more, as if they were zeros.
+    fn from_bytes(bytes: &[u8]) -> Self;
+}
+
+macro_rules! element {
+    ($number:ty, $type:ident) => {
+        impl Element for $number {
+            const TYPE: ElementType = ElementType::$type;
+            fn write_to(self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+            fn from_bytes(bytes: &[u8]) -> Self {
+                Self::from_le_bytes(bytes.try_into().unwrap_or_default())
+            }
+        }
+    };
+}
+element!(u16, U16);
+element!(u32, U32);
+element!(u64, U64);
+element!(f32, F32);
+element!(f64, F64);

@@ -1,0 +1,597 @@
+//! Triangle meshes: what a mesh file holds once it is read, checked and in our axes.
+//!
+//! Triangles wind counterclockwise seen from the side their normal points to. Derived quantities are
+//! computed in `f64` and rounded once.
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+/// What a triangle is painted with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// As in the file it came from.
+    pub name: String,
+    /// Diffuse reflectance, linear RGB, each in [0, 1].
+    pub albedo: Vec3,
+}
+
+/// Triangles over shared vertices.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Positions of the vertices.
+    pub positions: Vec<Vec3>,
+    /// Three vertices a triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit normals, one a vertex, where the mesh brings its own.
+    pub normals: Option<Vec<Vec3>>,
+    /// Index into `materials`, one a triangle.
+    pub triangle_materials: Vec<u32>,
+    /// The materials.
+    pub materials: Vec<Material>,
+}
+
+/// Why a mesh makes no sense, as opposed to being untidy.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum MeshError {
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} uses vertex {found} of {vertex_count}")]
+    VertexOutOfRange {
+        /// Which triangle.
+        triangle: usize,
+        /// The vertex it names.
+        found: u32,
+        /// How many there are.
+        vertex_count: usize,
+    },
+    /// A triangle names a material that does not exist.
+    #[error("triangle {triangle} uses material {found} of {material_count}")]
+    MaterialOutOfRange {
+        /// Which triangle.
+        triangle: usize,
+        /// The material it names.
+        found: u32,
+        /// How many there are.
+        material_count: usize,
+    },
+    /// An albedo is not a number in [0, 1].
+    #[error("material \"{name}\" has albedo {found}; expected 0 to 1")]
+    AlbedoOutOfRange {
+        /// The material's name.
+        name: String,
+        /// Its albedo.
+        found: Vec3,
+    },
+    /// An array does not have one entry for each vertex or triangle.
+    #[error("{what}: {found} entries, expected {expected}")]
+    WrongLength {
+        /// Which array.
+        what: &'static str,
+        /// Number of vertices or triangles.
+        expected: usize,
+        /// Number of entries.
+        found: usize,
+    },
+}
+
+/// What [`clean`] dropped and what it found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MeshReport {
+    /// Vertices with a coordinate that is infinite or not a number; dropped.
+    pub not_finite_vertices: usize,
+    /// Triangles on such a vertex; dropped.
+    pub not_finite_triangles: usize,
+    /// Triangles without area; dropped.
+    pub degenerate_triangles: usize,
+    /// Finite vertices that no triangle is left to use; dropped.
+    pub unused_vertices: usize,
+    /// Normals of kept vertices that are zero or not finite; if there are any, all normals are dropped.
+    pub invalid_normals: usize,
+    /// Edges with three or more triangles; kept. Vertices at the same place count as one.
+    pub non_manifold_edges: usize,
+    /// Edges with one triangle, where the surface ends; kept. None in a closed mesh.
+    pub boundary_edges: usize,
+}
+
+impl TriangleMesh {
+    /// Bare triangles of one grey material of albedo 0.5.
+    pub fn from_triangles(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
+        Self {
+            triangle_materials: vec![0; triangles.len()],
+            positions,
+            triangles,
+            normals: None,
+            materials: vec![Material {
+                name: "grey".to_owned(),
+                albedo: Vec3::splat(0.5),
+            }],
+        }
+    }
+
+    /// The three corners of a triangle.
+    ///
+    /// # Panics
+    /// If there is no such triangle, or it names a vertex that does not exist.
+    pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
+        self.triangles[triangle].map(|vertex| self.positions[vertex as usize])
+    }
+}
+
+/// Checks that all indices and lengths fit and that albedos are in range.
+///
+/// # Errors
+/// [`MeshError`], the first in the order of the arrays.
+pub fn check(mesh: &TriangleMesh) -> Result<(), MeshError> {
+    let length = |what, expected, found| {
+        let error = MeshError::WrongLength {
+            what,
+            expected,
+            found,
+        };
+        if expected == found {
+            Ok(())
+        } else {
+            Err(error)
+        }
+    };
+    let (vertex_count, material_count) = (mesh.positions.len(), mesh.materials.len());
+    if let Some(normals) = &mesh.normals {
+        length("normals", vertex_count, normals.len())?;
+    }
+    let triangle_count = mesh.triangles.len();
+    length(
+        "triangle materials",
+        triangle_count,
+        mesh.triangle_materials.len(),
+    )?;
+    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+        if let Some(&found) = vertices.iter().find(|&&v| v as usize >= vertex_count) {
+            return Err(MeshError::VertexOutOfRange {
+                triangle,
+                found,
+                vertex_count,
+            });
+        }
+    }
+    for (triangle, &found) in mesh.triangle_materials.iter().enumerate() {
+        if found as usize >= material_count {
+            return Err(MeshError::MaterialOutOfRange {
+                triangle,
+                found,
+                material_count,
+            });
+        }
+    }
+    for material in &mesh.materials {
+        let albedo = material.albedo;
+        // Written so that NaN fails.
+        if !(albedo.cmpge(Vec3::ZERO).all() && albedo.cmple(Vec3::ONE).all()) {
+            return Err(MeshError::AlbedoOutOfRange {
+                name: material.name.clone(),
+                found: albedo,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// A copy without triangles that have no area or no finite position, and without vertices that none
+/// uses; the order of the rest is kept, and so are all materials. Normals are brought to unit length; if
+/// one that is left has no direction, all are dropped ([`with_smooth_normals`] makes new ones).
+///
+/// # Errors
+/// Those of [`check`].
+pub fn clean(mesh: &TriangleMesh) -> Result<(TriangleMesh, MeshReport), MeshError> {
+    check(mesh)?;
+    let mut report = MeshReport::default();
+    let finite: Vec<bool> = mesh.positions.iter().map(|p| p.is_finite()).collect();
+    report.not_finite_vertices = finite.iter().filter(|&&f| !f).count();
+    const UNUSED: u32 = u32::MAX;
+    let mut new_index = vec![UNUSED; mesh.positions.len()];
+    let mut kept = Vec::with_capacity(mesh.triangles.len());
+    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+        if vertices.iter().any(|&v| !finite[v as usize]) {
+            report.not_finite_triangles += 1;
+        } else if is_degenerate(mesh.corners(triangle)) {
+            report.degenerate_triangles += 1;
+        } else {
+            kept.push(triangle);
+            for &vertex in vertices {
+                new_index[vertex as usize] = 0;
+            }
+        }
+    }
+    let mut used = Vec::with_capacity(mesh.positions.len());
+    for (vertex, index) in new_index.iter_mut().enumerate() {
+        if *index != UNUSED {
+            *index = used.len() as u32;
+            used.push(vertex);
+        }
+    }
+    report.unused_vertices = mesh.positions.len() - used.len() - report.not_finite_vertices;
+    let mut normals = None;
+    if let Some(given) = &mesh.normals {
+        let unit: Vec<Option<DVec3>> = used
+            .iter()
+            .map(|&v| given[v].as_dvec3().try_normalize())
+            .collect();
+        report.invalid_normals = unit.iter().filter(|n| n.is_none()).count();
+        normals = unit.into_iter().map(|n| n.map(|n| n.as_vec3())).collect();
+    }
+    let cleaned = TriangleMesh {
+        positions: used.iter().map(|&v| mesh.positions[v]).collect(),
+        triangles: kept
+            .iter()
+            .map(|&t| mesh.triangles[t].map(|v| new_index[v as usize]))
+            .collect(),
+        normals,
+        triangle_materials: kept.iter().map(|&t| mesh.triangle_materials[t]).collect(),
+        materials: mesh.materials.clone(),
+    };
+    for triangle_count in edge_triangle_counts(&cleaned) {
+        report.boundary_edges += usize::from(triangle_count == 1);
+        report.non_manifold_edges += usize::from(triangle_count > 2);
+    }
+    Ok((cleaned, report))
+}
+
+/// Unit normals, one a triangle; zero for triangles without area.
+pub fn face_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
+    area_normals(mesh)
+        .into_iter()
+        .map(|n| n.normalize_or_zero().as_vec3())
+        .collect()
+}
+
+/// Areas of the triangles.
+pub fn areas(mesh: &TriangleMesh) -> Vec<f64> {
+    area_normals(mesh).into_iter().map(|n| n.length()).collect()
+}
+
+/// Unit normals for the three corners of each triangle: the mean, weighted by area, of the normals of
+/// those triangles around the corner's position that lie within `crease_angle_rad` of this one's.
+///
+/// At 0 every triangle is flat, at π all are smooth. Vertices at the same place count as one, so seams of
+/// split vertices do not show. Where nothing is left of the mean the triangle's own normal stands.
+///
+/// Cost: the sum over positions of the square of the number of triangles that meet there.
+pub fn corner_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> Vec<[Vec3; 3]> {
+    let area_normals = area_normals(mesh);
+    let unit_normals: Vec<DVec3> = area_normals.iter().map(|n| n.normalize_or_zero()).collect();
+    // Neighbours in one plane must pass at angle 0 in spite of rounding.
+    let least_cosine = libm::cos(crease_angle_rad) - 1e-12;
+    let place = first_vertex_at_each_place(mesh);
+    let mut start = vec![0; mesh.positions.len() + 1];
+    for &vertex in mesh.triangles.iter().flatten() {
+        start[place[vertex as usize] as usize + 1] += 1;
+    }
+    for k in 0..mesh.positions.len() {
+        start[k + 1] += start[k];
+    }
+    let mut next = start.clone();
+    let mut triangles_at = vec![0; mesh.triangles.len() * 3];
+    for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+        for &vertex in vertices {
+            let slot = &mut next[place[vertex as usize] as usize];
+            triangles_at[*slot] = triangle;
+            *slot += 1;
+        }
+    }
+    let corner = |triangle: usize, vertex: u32| {
+        let at = place[vertex as usize] as usize;
+        let own = unit_normals[triangle];
+        let around = triangles_at[start[at]..start[at + 1]].iter();
+        let within = around.filter(|&&t| unit_normals[t].dot(own) >= least_cosine);
+        let sum: DVec3 = within.map(|&t| area_normals[t]).sum();
+        sum.try_normalize().unwrap_or(own).as_vec3()
+    };
+    let all = mesh.triangles.iter().enumerate();
+    all.map(|(triangle, vertices)| vertices.map(|vertex| corner(triangle, vertex)))
+        .collect()
+}
+
+/// A copy whose vertices carry the normals of [`corner_normals`]; a vertex is split where its corners
+/// differ.
+pub fn with_smooth_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> TriangleMesh {
+    let mut positions = Vec::with_capacity(mesh.positions.len());
+    let mut normals: Vec<Vec3> = Vec::with_capacity(mesh.positions.len());
+    // New vertices of each old one; nearly always one or two.
+    let mut copies: Vec<Vec<u32>> = vec![Vec::new(); mesh.positions.len()];
+    let mut triangles = mesh.triangles.clone();
+    let corner_normals = corner_normals(mesh, crease_angle_rad);
+    for (vertices, corner_normals) in triangles.iter_mut().zip(corner_normals) {
+        for (vertex, normal) in vertices.iter_mut().zip(corner_normals) {
+            let old = *vertex as usize;
+            let same = copies[old].iter().find(|&&v| normals[v as usize] == normal);
+            *vertex = same.copied().unwrap_or(positions.len() as u32);
+            if *vertex as usize == positions.len() {
+                copies[old].push(*vertex);
+                positions.push(mesh.positions[old]);
+                normals.push(normal);
+            }
+        }
+    }
+    TriangleMesh {
+        positions,
+        triangles,
+        normals: Some(normals),
+        triangle_materials: mesh.triangle_materials.clone(),
+        materials: mesh.materials.clone(),
+    }
+}
+
+/// Smallest and largest coordinates of all vertices; `None` without vertices.
+pub fn bounds(mesh: &TriangleMesh) -> Option<[Vec3; 2]> {
+    let first = *mesh.positions.first()?;
+    let all = mesh.positions.iter();
+    Some(all.fold([first; 2], |[low, high], &p| [low.min(p), high.max(p)]))
+}
+
+/// Takes coordinates with z up to ours with y up; x stays, and so does right-handedness.
+pub const Y_UP_FROM_Z_UP: DMat3 = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
+
+/// Moves, turns and scales a mesh. Normals go with the inverse transpose; under a mirror image triangles
+/// wind the other way, so that outsides stay outside.
+///
+/// A scale is `DAffine3::from_scale`, a change of axes `DAffine3::from_mat3(Y_UP_FROM_Z_UP)`.
+pub fn transform(mesh: &mut TriangleMesh, transform: &DAffine3) {
+    for position in &mut mesh.positions {
+        *position = transform.transform_point3(position.as_dvec3()).as_vec3();
+    }
+    let [x, y, z] = [0, 1, 2].map(|k| transform.matrix3.col(k));
+    let determinant = x.cross(y).dot(z);
+    if let Some(normals) = &mut mesh.normals {
+        // The cofactor matrix is the inverse transpose times the determinant, and never divides.
+        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
+        for normal in normals {
+            let turned = cofactors * normal.as_dvec3() * determinant.signum();
+            *normal = turned.normalize_or_zero().as_vec3();
+        }
+    }
+    if determinant < 0.0 {
+        for vertices in &mut mesh.triangles {
+            vertices.swap(1, 2);
+        }
+    }
+}
+
+/// True where a triangle's height over its longest side is lost in the rounding of positions.
+fn is_degenerate(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|corner| corner.as_dvec3());
+    let longest = (b - a)
+        .length_squared()
+        .max((c - b).length_squared())
+        .max((a - c).length_squared());
+    // Height over length of 1e-7 is one rounding of f32.
+    area_normal([a, b, c]).length() * 2.0 <= 1e-7 * longest
+}
+
+/// The normal times the area.
+fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
+    0.5 * (b - a).cross(c - a)
+}
+
+fn area_normals(mesh: &TriangleMesh) -> Vec<DVec3> {
+    (0..mesh.triangles.len())
+        .map(|t| area_normal(mesh.corners(t).map(|corner| corner.as_dvec3())))
+        .collect()
+}
+
+/// For each vertex the first one at the same position; -0 and 0 are the same.
+fn first_vertex_at_each_place(mesh: &TriangleMesh) -> Vec<u32> {
+    // Adding zero turns -0 into 0.
+    let key = |v: u32| {
+        (mesh.positions[v as usize] + Vec3::ZERO)
+            .to_array()
+            .map(f32::to_bits)
+    };
+    let mut order: Vec<u32> = (0..mesh.positions.len() as u32).collect();
+    order.sort_unstable_by_key(|&v| (key(v), v));
+    let mut first = vec![0; order.len()];
+    let mut current = None;
+    for &vertex in &order {
+        let place = match current {
+            Some(leader) if key(leader) == key(vertex) => leader,
+            _ => vertex,
+        };
+        first[vertex as usize] = place;
+        current = Some(place);
+    }
+    first
+}
+
+/// How many triangles each edge has, in no particular order of edges.
+fn edge_triangle_counts(mesh: &TriangleMesh) -> Vec<usize> {
+    let place = first_vertex_at_each_place(mesh);
+    let mut edges = Vec::with_capacity(mesh.triangles.len() * 3);
+    for vertices in &mesh.triangles {
+        let [a, b, c] = vertices.map(|v| place[v as usize]);
+        edges.extend([[a, b], [b, c], [c, a]].map(|[v, w]| [v.min(w), v.max(w)]));
+    }
+    edges.sort_unstable();
+    edges.chunk_by(|a, b| a == b).map(<[_]>::len).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    /// The unit cube, closed, two triangles a side, normals outwards.
+    fn cube() -> TriangleMesh {
+        let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2 & 1) as f32);
+        let quads = [
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
+        TriangleMesh::from_triangles((0..8).map(corner).collect(), triangles)
+    }
+
+    #[test]
+    fn a_closed_cube_is_clean() {
+        let (cleaned, report) = clean(&cube()).unwrap();
+        assert_eq!(cleaned, cube());
+        assert_eq!(report, MeshReport::default());
+        assert_eq!(areas(&cleaned).iter().sum::<f64>(), 6.0);
+        for (triangle, normal) in face_normals(&cleaned).into_iter().enumerate() {
+            let center = cleaned.corners(triangle).iter().sum::<Vec3>() / 3.0;
+            assert!((center - Vec3::splat(0.5)).dot(normal) > 0.49);
+        }
+        assert_eq!(bounds(&cleaned), Some([Vec3::ZERO, Vec3::ONE]));
+        assert_eq!(bounds(&TriangleMesh::default()), None);
+    }
+
+    #[test]
+    fn every_kind_of_dirt_is_dropped_and_counted() {
+        let mut mesh = cube();
+        mesh.positions.insert(0, Vec3::splat(9.0));
+        for vertex in mesh.triangles.iter_mut().flatten() {
+            *vertex += 1;
+        }
+        mesh.positions.push(Vec3::new(f32::NAN, 0.0, 0.0));
+        mesh.positions.push(Vec3::new(0.0, f32::NEG_INFINITY, 0.0));
+        mesh.positions.push(Vec3::splat(0.1));
+        mesh.positions.push(Vec3::splat(0.3));
+        // Two with a bad vertex, one that repeats a vertex, one whose corners are in line but for
+        // rounding, and a fin on an edge of the cube and a diagonal of a side.
+        mesh.triangles
+            .extend([[1, 2, 9], [10, 2, 3], [4, 4, 5], [1, 11, 12], [1, 2, 8]]);
+        mesh.triangle_materials.resize(17, 0);
+        let (cleaned, report) = clean(&mesh).unwrap();
+        let expected = MeshReport {
+            not_finite_vertices: 2,
+            not_finite_triangles: 2,
+            degenerate_triangles: 2,
+            unused_vertices: 3,
+            invalid_normals: 0,
+            non_manifold_edges: 2,
+            boundary_edges: 1,
+        };
+        assert_eq!(report, expected);
+        assert_eq!(cleaned.positions, cube().positions);
+        assert_eq!(cleaned.triangles[..12], cube().triangles);
+        assert_eq!(cleaned.triangles[12..], [[0, 1, 7]]);
+        let (again, second_report) = clean(&cleaned).unwrap();
+        assert_eq!(again, cleaned);
+        assert_eq!(second_report.degenerate_triangles, 0);
+    }
+
+    #[test]
+    fn normals_are_made_unit_or_dropped() {
+        let mut mesh = cube();
+        mesh.normals = Some(vec![Vec3::new(0.0, 3.0, 0.0); 8]);
+        let (cleaned, report) = clean(&mesh).unwrap();
+        assert_eq!(cleaned.normals, Some(vec![Vec3::Y; 8]));
+        assert_eq!(report.invalid_normals, 0);
+        for bad in [Vec3::ZERO, Vec3::splat(f32::NAN)] {
+            let mut normals = vec![Vec3::Y; 8];
+            normals[3] = bad;
+            mesh.normals = Some(normals);
+            let (cleaned, report) = clean(&mesh).unwrap();
+            assert_eq!((cleaned.normals, report.invalid_normals), (None, 1));
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_name() {
+        let mut mesh = cube();
+        mesh.triangles[3][1] = 8;
+        let expected = MeshError::VertexOutOfRange {
+            triangle: 3,
+            found: 8,
+            vertex_count: 8,
+        };
+        assert_eq!(clean(&mesh), Err(expected));
+        let mut mesh = cube();
+        mesh.triangle_materials[2] = 1;
+        assert!(matches!(
+            check(&mesh),
+            Err(MeshError::MaterialOutOfRange { triangle: 2, .. })
+        ));
+        let mut mesh = cube();
+        mesh.triangle_materials.pop();
+        assert!(matches!(
+            check(&mesh),
+            Err(MeshError::WrongLength { expected: 12, .. })
+        ));
+        let mut mesh = cube();
+        mesh.normals = Some(vec![Vec3::Y; 7]);
+        assert!(matches!(
+            check(&mesh),
+            Err(MeshError::WrongLength { found: 7, .. })
+        ));
+        for albedo in [1.01, -0.1, f32::NAN] {
+            let mut mesh = cube();
+            mesh.materials[0].albedo.y = albedo;
+            assert!(matches!(
+                check(&mesh),
+                Err(MeshError::AlbedoOutOfRange { .. })
+            ));
+        }
+    }
+
+    #[test]
+    fn an_open_cube_has_a_boundary_and_split_vertices_do_not() {
+        let mut open = cube();
+        open.triangles.truncate(10);
+        open.triangle_materials.truncate(10);
+        assert_eq!(clean(&open).unwrap().1.boundary_edges, 4);
+        let split = with_smooth_normals(&cube(), 0.0);
+        assert_eq!(split.positions.len(), 24);
+        assert_eq!(clean(&split).unwrap().1, MeshReport::default());
+    }
+
+    #[test]
+    fn the_crease_angle_separates_flat_from_smooth() {
+        let flat = with_smooth_normals(&cube(), FRAC_PI_2 - 0.01);
+        let faces = face_normals(&flat);
+        for (vertices, face) in flat.triangles.iter().zip(faces) {
+            for &vertex in vertices {
+                assert_eq!(flat.normals.as_ref().unwrap()[vertex as usize], face);
+            }
+        }
+        let smooth = with_smooth_normals(&cube(), PI);
+        assert_eq!(smooth.positions.len(), 8);
+        // Every corner of the cube has one or two triangles of equal area from each of three sides.
+        for (normal, position) in smooth.normals.unwrap().iter().zip(&smooth.positions) {
+            let outward = (*position - Vec3::splat(0.5)).normalize();
+            assert!(normal.dot(outward) > 0.9, "{normal} at {position}");
+        }
+    }
+
+    #[test]
+    fn smooth_normals_are_weighted_by_area() {
+        // Two triangles that share an edge at a right angle, one of three times the area.
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, 3.0, 0.0), Vec3::Z];
+        let mesh = TriangleMesh::from_triangles(positions, vec![[0, 1, 2], [0, 3, 1]]);
+        let normals = corner_normals(&mesh, PI);
+        let expected = Vec3::new(0.0, 1.0, 3.0).normalize();
+        assert!((normals[0][0] - expected).length() < 1e-7);
+        assert_eq!(normals[0][2], Vec3::Z);
+    }
+
+    #[test]
+    fn transforms_keep_the_outside_outside() {
+        let mirror = DAffine3::from_scale(DVec3::new(-2.0, 1.0, 3.0));
+        let axes = DAffine3::from_mat3(Y_UP_FROM_Z_UP);
+        for change in [mirror, axes, axes * mirror] {
+            let mut mesh = with_smooth_normals(&cube(), 0.0);
+            transform(&mut mesh, &change);
+            let faces = face_normals(&mesh);
+            let center = change.transform_point3(DVec3::splat(0.5)).as_vec3();
+            for (triangle, face) in faces.into_iter().enumerate() {
+                assert!((mesh.corners(triangle)[0] - center).dot(face) > 0.0);
+                let vertex = mesh.triangles[triangle][0] as usize;
+                assert!((mesh.normals.as_ref().unwrap()[vertex] - face).length() < 1e-6);
+            }
+        }
+        assert_eq!(Y_UP_FROM_Z_UP * DVec3::Z, DVec3::Y);
+        assert_eq!(Y_UP_FROM_Z_UP.determinant(), 1.0);
+    }
+}

@@ -1,0 +1,148 @@
+//! The light prior: a basis of plausible direct light in a shape (Loos et al. 2011, section 4), and
+//! its enrichment (appendix A).
+
+use crate::config::{Enrichment, PriorConfig};
+use glam::DVec3;
+use mrt_core::cube::Face;
+use mrt_core::matrix::Matrix;
+use mrt_core::parity::ParityClasses;
+use mrt_core::radiometry::sphere_light_irradiance;
+use mrt_core::svd::svd;
+use mrt_runtime::shape::Shape;
+
+/// Columns `P S` (basis vectors of direct irradiance times their singular values), in the coordinates
+/// of each parity class of the texels.
+#[derive(Clone, Debug)]
+pub struct ScaledBasis {
+    /// One matrix a class: class dimension x vectors.
+    pub classes: Vec<Matrix<f64>>,
+}
+
+/// A light prior with all its singular values, largest first.
+#[derive(Clone, Debug)]
+pub struct LightPrior {
+    /// `P S`, cut to the configured number of vectors over all classes.
+    pub basis: ScaledBasis,
+    /// Singular values of the samples `L_d`.
+    pub singular_values: Vec<f64>,
+}
+
+/// Centres of the sphere lights: a lattice at (i + 1) / (n + 1) inside the cube, and the same lattice
+/// in the cell beyond each opening, from where the light shines in.
+pub fn prior_lights(shape: &Shape, per_axis: usize) -> Vec<DVec3> {
+    let step = 1.0 / (per_axis + 1) as f64;
+    let lattice: Vec<DVec3> = (0..per_axis * per_axis * per_axis)
+        .map(|k| {
+            let (x, rest) = (k % per_axis, k / per_axis);
+            let (y, z) = (rest % per_axis, rest / per_axis);
+            DVec3::new((x + 1) as f64, (y + 1) as f64, (z + 1) as f64) * step
+        })
+        .collect();
+    let cells = std::iter::once(DVec3::ZERO).chain(shape.openings.iter().map(|o| o.outward()));
+    cells
+        .flat_map(|cell| lattice.iter().map(move |&p| p + cell))
+        .collect()
+}
+
+/// The samples `L_d`: direct irradiance, texels x lights, from lights of unit intensity.
+///
+/// Every texel sees every light: the cube is convex, and the segment to a light in the cell beyond an
+/// opening crosses that opening.
+pub fn direct_samples(shape: &Shape, resolution: usize, config: &PriorConfig) -> Matrix<f64> {
+    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
+    let lights = prior_lights(shape, config.lights_per_axis);
+    Matrix::from_fn(texels.len(), lights.len(), |texel, light| {
+        let (face, point) = texels[texel];
+        sphere_light_irradiance(lights[light] - point, -face.outward(), config.light_radius)
+    })
+}
+
+/// Decomposes the samples and keeps the `k_d` largest vectors.
+pub fn light_prior(samples: &Matrix<f64>, classes: &ParityClasses, k_d: usize) -> LightPrior {
+    let folded: Vec<Matrix<f64>> = (0..classes.class_count())
+        .map(|class| classes.fold_columns(class, samples))
+        .collect();
+    decompose(&folded, k_d)
+}
+
+/// Appendix A: the prior, functions that are constant on one wall, and the indirect light basis `U_b`,
+/// each scaled to its weight in Frobenius norm, put side by side and decomposed again.
+///
+/// The first keeps what the prior had, the second follows shadows and differing albedos, the third what
+/// indirect light looks like when it becomes the direct light of the next bounce.
+pub fn enriched_prior(
+    prior: &LightPrior,
+    indirect_basis: &Matrix<f64>,
+    shape: &Shape,
+    classes: &ParityClasses,
+    config: &Enrichment,
+) -> LightPrior {
+    let per_wall = classes.point_count() / (6 - shape.openings.len());
+    let constants = Matrix::from_fn(
+        classes.point_count(),
+        6 - shape.openings.len(),
+        |texel, wall| f64::from(u8::from(texel / per_wall == wall)),
+    );
+    let parts: Vec<(f64, Vec<Matrix<f64>>)> = vec![
+        (1.0, prior.basis.classes.clone()),
+        (config.constant_weight, fold_all(classes, &constants)),
+        (config.indirect_weight, fold_all(classes, indirect_basis)),
+    ];
+    let stacked: Vec<Matrix<f64>> = (0..classes.class_count())
+        .map(|class| {
+            let mut columns: Vec<Vec<f64>> = Vec::new();
+            for (weight, part) in &parts {
+                let norm = part
+                    .iter()
+                    .map(|m| m.frobenius_norm().powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                for j in 0..part[class].columns() {
+                    let scale = weight / norm;
+                    columns.push(part[class].column(j).iter().map(|x| x * scale).collect());
+                }
+            }
+            Matrix::from_columns(classes.dimension(class), &columns)
+        })
+        .collect();
+    decompose(&stacked, usize::MAX)
+}
+
+fn fold_all(classes: &ParityClasses, signals: &Matrix<f64>) -> Vec<Matrix<f64>> {
+    (0..classes.class_count())
+        .map(|class| classes.fold_columns(class, signals))
+        .collect()
+}
+
+/// Left singular vectors times singular values, class by class, keeping the `keep` largest overall
+/// that are not lost in rounding.
+fn decompose(folded: &[Matrix<f64>], keep: usize) -> LightPrior {
+    let parts: Vec<_> = folded.iter().map(|m| svd(m.view())).collect();
+    let mut singular_values: Vec<f64> = parts
+        .iter()
+        .flat_map(|part| part.singular_values.iter().copied())
+        .collect();
+    singular_values.sort_by(|a, b| b.total_cmp(a));
+    let largest = singular_values.first().copied().unwrap_or(0.0);
+    let threshold = match singular_values.get(keep.saturating_sub(1)) {
+        Some(&smallest_kept) => smallest_kept,
+        None => 0.0,
+    }
+    .max(1e-12 * largest);
+    let classes = parts
+        .iter()
+        .map(|part| {
+            let count = part
+                .singular_values
+                .iter()
+                .filter(|&&s| s >= threshold)
+                .count();
+            let scales = &part.singular_values[..count];
+            part.u.leading_columns(count).scaled_columns(scales)
+        })
+        .collect();
+    LightPrior {
+        basis: ScaledBasis { classes },
+        singular_values,
+    }
+}

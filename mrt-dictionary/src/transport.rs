@@ -1,0 +1,126 @@
+//! Reduced direct-to-indirect transfer inside one shape (Loos et al. 2011, section 4.1).
+//!
+//! With `M = F P S = U_m S_m V_mᵀ`: the indirect basis `U_b = U_m S_m`, the implicit lighting
+//! `L_imp = P S V_m` whose indirect light it is (`U_b = F L_imp`), and the operator that gives the
+//! coefficients. For the last we depart from the paper's `V_mᵀ S⁻¹ Pᵀ` and take `S_m⁻¹ U_mᵀ F`: it has
+//! the same size, is the orthogonal projection of the true indirect light on the basis whatever the direct
+//! light, and needs no inverse of S, whose condition reaches 1e11.
+
+use crate::prior::ScaledBasis;
+use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
+use mrt_core::parity::ParityClasses;
+use mrt_core::svd::{dropped_energy, svd};
+
+/// Singular values closer than this, relatively, belong to one multiplet of the shape's symmetry, and a
+/// cut never separates them: which vectors of a multiplet come first is a matter of rounding.
+pub const MULTIPLET_TOLERANCE: f64 = 1e-6;
+
+/// The reduced operators of one shape, in texel space.
+#[derive(Clone, Debug)]
+pub struct BlockTransport {
+    /// `U_b`, texels x modes: indirect irradiance of each mode.
+    pub indirect_basis: Matrix<f64>,
+    /// `T_d->b`, modes x texels.
+    pub coefficients_from_direct: Matrix<f64>,
+    /// `L_imp`, texels x modes: radiosity that produces the columns of the basis.
+    pub implicit_lighting: Matrix<f64>,
+    /// All singular values of M, largest first; the first `modes` belong to the columns.
+    pub singular_values: Vec<f64>,
+    /// Fraction of M's energy beyond the modes kept.
+    pub dropped_energy: f64,
+}
+
+/// F in the coordinates of each parity class; F respects the mirrors, so nothing is lost.
+pub fn fold_bounce(bounce: &Matrix<f64>, classes: &ParityClasses) -> Vec<Matrix<f64>> {
+    (0..classes.class_count())
+        .map(|class| {
+            let columns: Vec<Vec<f64>> = (0..classes.dimension(class))
+                .map(|k| {
+                    let mut unit = vec![0.0; classes.dimension(class)];
+                    unit[k] = 1.0;
+                    let signal = classes.unfold(class, &unit);
+                    let signal = Matrix::from_column_major(signal.len(), 1, signal);
+                    let image = multiply_sparse(bounce, signal.column(0));
+                    classes.fold(class, &image)
+                })
+                .collect();
+            Matrix::from_columns(classes.dimension(class), &columns)
+        })
+        .collect()
+}
+
+/// Product with a vector that is zero nearly everywhere.
+fn multiply_sparse(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; a.rows()];
+    for (j, &weight) in x.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
+        for (o, &value) in out.iter_mut().zip(a.column(j)) {
+            *o += value * weight;
+        }
+    }
+    out
+}
+
+/// Computes the operators from a prior, keeping at most `modes` modes (fewer where a multiplet would be
+/// cut).
+pub fn block_transport(
+    folded_bounce: &[Matrix<f64>],
+    prior: &ScaledBasis,
+    classes: &ParityClasses,
+    modes: usize,
+) -> BlockTransport {
+    let parts: Vec<_> = folded_bounce
+        .iter()
+        .zip(&prior.classes)
+        .map(|(bounce, basis)| svd(multiply(bounce.view(), basis.view()).view()))
+        .collect();
+    let mut order: Vec<(usize, usize)> = (0..parts.len())
+        .flat_map(|class| (0..parts[class].singular_values.len()).map(move |k| (class, k)))
+        .collect();
+    let value = |&(class, k): &(usize, usize)| parts[class].singular_values[k];
+    order.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
+    let singular_values: Vec<f64> = order.iter().map(value).collect();
+    let kept = whole_multiplets(&singular_values, modes);
+
+    let mut indirect_columns = Vec::with_capacity(kept);
+    let mut implicit_columns = Vec::with_capacity(kept);
+    let mut coefficient_rows = Vec::with_capacity(kept);
+    for &(class, k) in &order[..kept] {
+        let part = &parts[class];
+        let sigma = part.singular_values[k];
+        let u = part.u.column(k);
+        let scaled: Vec<f64> = u.iter().map(|x| x * sigma).collect();
+        indirect_columns.push(classes.unfold(class, &scaled));
+        let v = part.v.columns_view(k..k + 1);
+        let implicit = multiply(prior.classes[class].view(), v);
+        implicit_columns.push(classes.unfold(class, implicit.data()));
+        let row = transpose_multiply(folded_bounce[class].view(), part.u.columns_view(k..k + 1));
+        let row: Vec<f64> = row.data().iter().map(|x| x / sigma).collect();
+        coefficient_rows.push(classes.unfold(class, &row));
+    }
+    let texels = classes.point_count();
+    BlockTransport {
+        indirect_basis: Matrix::from_columns(texels, &indirect_columns),
+        coefficients_from_direct: Matrix::from_columns(texels, &coefficient_rows).transposed(),
+        implicit_lighting: Matrix::from_columns(texels, &implicit_columns),
+        dropped_energy: dropped_energy(&singular_values, kept),
+        singular_values,
+    }
+}
+
+/// The largest count up to `modes` that does not cut through equal singular values, and leaves out
+/// those lost in rounding.
+pub fn whole_multiplets(singular_values: &[f64], modes: usize) -> usize {
+    let largest = singular_values.first().copied().unwrap_or(0.0);
+    let significant = singular_values
+        .iter()
+        .take_while(|&&s| s > 1e-12 * largest)
+        .count();
+    let mut kept = modes.min(significant);
+    if kept < significant {
+        let next = singular_values[kept];
+        while kept > 0 && singular_values[kept - 1] - next <= MULTIPLET_TOLERANCE * next {
+            kept -= 1;
+        }
+    }
+    kept
+}

@@ -1,0 +1,307 @@
+//! Joins a level and a dictionary into a scene (Loos et al. 2011, sections 6.2 and 6.3).
+
+use crate::atlas::AtlasLayout;
+use crate::dictionary::{Dictionary, InterfaceOperators};
+use crate::level::{Level, LevelError, Opening, corner_index};
+use crate::propagate;
+use crate::scene::{Beyond, Interface, Scene, SceneBlock, SceneShape};
+use crate::shape::Shape;
+use glam::DVec3;
+use mrt_core::block_sparse::BlockSparse;
+use mrt_core::cube::{CubeRotation, Face};
+use mrt_core::matrix::Matrix;
+
+/// Settings of [`assemble`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct AssembleConfig {
+    /// Openings that light may cross, at most: `d_max`. Further blocks read 0 from the source.
+    pub max_depth: usize,
+}
+
+impl Default for AssembleConfig {
+    /// Eight openings: of what one-bounce light crosses that many, under 0.1 % arrives.
+    fn default() -> Self {
+        Self { max_depth: 8 }
+    }
+}
+
+/// Why a level and a dictionary do not make a scene.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum AssembleError {
+    /// The level itself is at fault.
+    #[error(transparent)]
+    Level(#[from] LevelError),
+    /// The dictionary was packed without a shape that the level uses.
+    #[error("block {block}: the dictionary has no shape `{shape}`; it has {expected}")]
+    MissingShape {
+        /// Which block.
+        block: usize,
+        /// The shape that it uses.
+        shape: &'static str,
+        /// Shapes in the dictionary.
+        expected: String,
+    },
+    /// Two openings meet with their up directions turned or mirrored against each other.
+    #[error(
+        "face {face} of block {block} meets face {other_face} of block {other} with its up direction \
+         towards {found}; expected +y on both sides (turn or mirror one block)"
+    )]
+    RolledInterface {
+        /// One block.
+        block: usize,
+        /// Its face, after orientation.
+        face: Face,
+        /// The other block.
+        other: usize,
+        /// Its face, after orientation.
+        other_face: Face,
+        /// Where the other block's +y points in this block's canonical cube.
+        found: String,
+    },
+}
+
+/// Checks the level, looks up its shapes and assembles `T_b->r`.
+///
+/// Cost: a k_rlf x k_rlf x k_b product for each opening that each block's light crosses.
+///
+/// # Errors
+/// [`AssembleError`].
+pub fn assemble(
+    level: &Level,
+    dictionary: &Dictionary,
+    config: &AssembleConfig,
+) -> Result<Scene, AssembleError> {
+    level.check()?;
+    let used = used_shapes(level, dictionary)?;
+    let blocks = place_blocks(level, dictionary, &used)?;
+    let resolution = dictionary.resolution;
+    let mut scene = Scene {
+        resolution,
+        shapes: used
+            .iter()
+            .map(|&index| scene_shape(dictionary, index))
+            .collect(),
+        texel_positions: Vec::new(),
+        texel_normals: Vec::new(),
+        texel_albedo: Vec::new(),
+        response_from_coefficients: BlockSparse::from_blocks(&[], &[], Vec::new()),
+        coefficient_count: blocks.last().map_or(0, |b| b.coefficients.end),
+        response_count: blocks
+            .iter()
+            .flat_map(|b| &b.interfaces)
+            .map(|i| i.responses.len())
+            .sum(),
+        atlas: AtlasLayout::new(&blocks, resolution),
+        blocks,
+    };
+    place_texels(&mut scene, level);
+    scene.response_from_coefficients =
+        propagate::response_from_coefficients(&scene, dictionary, &used, config.max_depth);
+    Ok(scene)
+}
+
+/// Dictionary positions of the shapes that the level uses, in dictionary order.
+fn used_shapes(level: &Level, dictionary: &Dictionary) -> Result<Vec<usize>, AssembleError> {
+    let mut used = vec![false; dictionary.shapes.len()];
+    for (index, block) in level.blocks.iter().enumerate() {
+        let position =
+            dictionary
+                .shape_index(block.shape)
+                .ok_or_else(|| AssembleError::MissingShape {
+                    block: index,
+                    shape: block.shape.name,
+                    expected: dictionary
+                        .shapes
+                        .iter()
+                        .map(|entry| entry.shape.name)
+                        .collect::<Vec<_>>()
+                        .join(", "),
+                })?;
+        used[position] = true;
+    }
+    Ok((0..used.len()).filter(|&k| used[k]).collect())
+}
+
+fn place_blocks(
+    level: &Level,
+    dictionary: &Dictionary,
+    used: &[usize],
+) -> Result<Vec<SceneBlock>, AssembleError> {
+    let neighbours = level.neighbours();
+    let mut blocks = Vec::with_capacity(level.blocks.len());
+    let (mut texel, mut coefficient, mut response) = (0, 0, 0);
+    for (index, block) in level.blocks.iter().enumerate() {
+        let shape_index = used
+            .iter()
+            .position(|&k| dictionary.shapes[k].shape == block.shape)
+            .unwrap_or(0);
+        let modes = dictionary.shapes[used[shape_index]].modes();
+        let texels = block.shape.texel_count(dictionary.resolution);
+        let mut beyond = [Beyond::Wall; 6];
+        let mut interfaces = Vec::new();
+        for (opening, &face) in block.shape.openings.iter().enumerate() {
+            let turned = block.orientation.face(face);
+            beyond[face.index()] = match neighbours[index][turned.index()] {
+                None => Beyond::Outside,
+                Some(there) => {
+                    let count = dictionary.interface.response_from_lightfield.rows();
+                    interfaces.push(Interface {
+                        opening,
+                        responses: response..response + count,
+                    });
+                    response += count;
+                    let here = Opening {
+                        block: index,
+                        face: turned,
+                    };
+                    crossing(level, here, there)?
+                }
+            };
+        }
+        blocks.push(SceneBlock {
+            shape_index,
+            shape: block.shape,
+            orientation: block.orientation,
+            warp: block.canonical_warp(),
+            beyond,
+            texels: texel..texel + texels,
+            coefficients: coefficient..coefficient + modes,
+            interfaces,
+        });
+        texel += texels;
+        coefficient += modes;
+    }
+    Ok(blocks)
+}
+
+/// How the canonical cubes on both sides of a connection stand to each other, read off the corners that
+/// meet.
+fn crossing(level: &Level, here: Opening, there: Opening) -> Result<Beyond, AssembleError> {
+    let canonical_face =
+        |end: Opening| level.blocks[end.block].orientation.inverse().face(end.face);
+    let (face_here, face_there) = (canonical_face(here), canonical_face(there));
+    let warp_here = level.blocks[here.block].canonical_warp();
+    let warp_there = level.blocks[there.block].canonical_warp();
+    // The corner of this block's cube that coincides with a corner of the other's face.
+    let matching = |unit_there: DVec3| {
+        let world = warp_there.corners[corner_index(unit_there)];
+        face_here
+            .rectangle([0.0, 1.0], [0.0, 1.0])
+            .into_iter()
+            .min_by(|a, b| {
+                let distance = |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
+                distance(a).total_cmp(&distance(b))
+            })
+            .unwrap_or(unit_there)
+    };
+    let origin = matching(face_there.point(0.0, 0.0));
+    let images = [
+        (
+            face_there.u_axis(),
+            matching(face_there.point(1.0, 0.0)) - origin,
+        ),
+        (
+            face_there.v_axis(),
+            matching(face_there.point(0.0, 1.0)) - origin,
+        ),
+        (
+            face_there.axis(),
+            -face_here.outward() * face_there.outward()[face_there.axis()],
+        ),
+    ];
+    let image_of = |axis: usize| {
+        images
+            .iter()
+            .find(|(a, _)| *a == axis)
+            .and_then(|(_, d)| Face::ALL.into_iter().find(|face| face.outward() == *d))
+    };
+    let rotation = match (image_of(0), image_of(1)) {
+        (Some(x), Some(y)) => CubeRotation::from_images(x, y),
+        _ => None,
+    };
+    let up = image_of(1);
+    let proper = rotation.filter(|r| up == Some(Face::PosY) && Some(r.face(Face::PosZ)) == image_of(2));
+    match proper {
+        Some(here_from_there) => Ok(Beyond::Block {
+            block: there.block,
+            face: face_there,
+            here_from_there,
+        }),
+        None => Err(AssembleError::RolledInterface {
+            block: here.block,
+            face: here.face,
+            other: there.block,
+            other_face: there.face,
+            found: up.map_or("no single direction".to_owned(), |face| face.to_string()),
+        }),
+    }
+}
+
+fn place_texels(scene: &mut Scene, level: &Level) {
+    for (block, placed) in level.blocks.iter().zip(&scene.blocks) {
+        for (face, unit) in placed.shape.texels(scene.resolution) {
+            let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
+            let normal = placed.warp.face_normal(face, u, v);
+            scene
+                .texel_positions
+                .push(placed.warp.point(unit).as_vec3());
+            scene.texel_normals.push(normal.as_vec3());
+            let turned = placed.orientation.face(face);
+            scene.texel_albedo.push(block.albedo[turned.index()]);
+        }
+    }
+}
+
+fn scene_shape(dictionary: &Dictionary, index: usize) -> SceneShape {
+    let entry = &dictionary.shapes[index];
+    SceneShape {
+        coefficients_from_direct: entry.coefficients_from_direct.clone(),
+        indirect_basis: entry.indirect_basis.clone(),
+        response_bases: entry
+            .shape
+            .openings
+            .iter()
+            .map(|&opening| {
+                response_basis_at(
+                    &dictionary.interface,
+                    entry.shape,
+                    opening,
+                    dictionary.resolution,
+                )
+            })
+            .collect(),
+    }
+}
+
+/// `U_r` for light that enters a shape through one of its openings: the canonical interface's rows, turned
+/// about +Y to that opening, for the walls that the shape has.
+fn response_basis_at(
+    interface: &InterfaceOperators,
+    shape: &Shape,
+    opening: Face,
+    resolution: usize,
+) -> Matrix<f32> {
+    let rows: Vec<usize> = shape
+        .texels(resolution)
+        .map(|(face, point)| {
+            let canonical = entering_frame(opening).inverse();
+            receiver_texel(canonical.face(face), canonical.point(point), resolution)
+        })
+        .collect();
+    interface.response_basis.selected_rows(&rows)
+}
+
+/// Takes the canonical interface, entered towards +z, to an opening entered from outside.
+pub(crate) fn entering_frame(opening: Face) -> CubeRotation {
+    (0..4)
+        .map(CubeRotation::about_y)
+        .find(|rotation| rotation.face(Face::NegZ) == opening)
+        .unwrap_or(CubeRotation::IDENTITY)
+}
+
+/// Row of a texel among the five walls of the cube open at -z.
+fn receiver_texel(face: Face, center: DVec3, resolution: usize) -> usize {
+    let wall = face.index() - usize::from(face > Face::NegZ);
+    let along = |axis: usize| (center[axis] * resolution as f64) as usize;
+    (wall * resolution + along(face.v_axis())) * resolution + along(face.u_axis())
+}

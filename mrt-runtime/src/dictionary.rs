@@ -1,0 +1,95 @@
+//! The dictionary as a running game holds it: the operators of the canonical shapes, in `f32`.
+
+use crate::shape::Shape;
+use mrt_core::matrix::Matrix;
+
+/// Baked operators of a set of shapes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dictionary {
+    /// Name of the preset that it was baked with.
+    pub preset: String,
+    /// Texels along an edge of a wall.
+    pub resolution: usize,
+    /// One entry a shape; no shape twice.
+    pub shapes: Vec<ShapeOperators>,
+    /// Operators of the interface that all shapes share.
+    pub interface: InterfaceOperators,
+}
+
+/// Operators of one shape; "texels" counts those of the shape's walls ([`Shape::texels`]).
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShapeOperators {
+    /// The shape.
+    pub shape: &'static Shape,
+    /// `T_d->b`, modes x texels: coefficients from outgoing radiosity.
+    pub coefficients_from_direct: Matrix<f32>,
+    /// `U_b`, texels x modes: indirect irradiance from coefficients.
+    pub indirect_basis: Matrix<f32>,
+    /// `L_imp`, texels x modes: radiosity whose indirect light the basis is.
+    pub implicit_lighting: Matrix<f32>,
+    /// `R_b->rlf`, lightfield modes x modes, for each opening in the order of [`Shape::openings`].
+    pub lightfield_from_coefficients: Vec<Matrix<f32>>,
+    /// Singular values of the modes, largest first.
+    pub singular_values: Vec<f32>,
+    /// Fraction of the energy of M that the modes left out hold.
+    pub dropped_energy: f32,
+}
+
+/// Operators of the canonical interface: the face z = 0 crossed towards +z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InterfaceOperators {
+    /// Lightfield at the opening straight ahead from the one entered: modes x modes.
+    pub straight: Matrix<f32>,
+    /// At the opening on the left (towards +x).
+    pub left: Matrix<f32>,
+    /// At the opening on the right (towards -x).
+    pub right: Matrix<f32>,
+    /// `T_rlf->r`, response modes x lightfield modes.
+    pub response_from_lightfield: Matrix<f32>,
+    /// `U_r`, texels x response modes, on the five walls of the cube open at -z.
+    pub response_basis: Matrix<f32>,
+    /// Fraction of the emitted and propagated lightfields' energy that the lightfield modes leave out.
+    pub lightfield_dropped_energy: f32,
+    /// Fraction of the response's energy that the response modes leave out.
+    pub response_dropped_energy: f32,
+}
+
+impl Dictionary {
+    /// Position in [`Dictionary::shapes`] of a shape, if it is there.
+    pub fn shape_index(&self, shape: &Shape) -> Option<usize> {
+        self.shapes.iter().position(|entry| entry.shape == shape)
+    }
+
+    /// Bytes of all matrices.
+    pub fn bytes(&self) -> usize {
+        let interface = &self.interface;
+        let shared = [
+            &interface.straight,
+            &interface.left,
+            &interface.right,
+            &interface.response_from_lightfield,
+            &interface.response_basis,
+        ];
+        let of_shapes = self.shapes.iter().flat_map(|entry| {
+            [
+                &entry.coefficients_from_direct,
+                &entry.indirect_basis,
+                &entry.implicit_lighting,
+            ]
+            .into_iter()
+            .chain(&entry.lightfield_from_coefficients)
+        });
+        shared
+            .into_iter()
+            .chain(of_shapes)
+            .map(|matrix| std::mem::size_of_val(matrix.data()))
+            .sum()
+    }
+}
+
+impl ShapeOperators {
+    /// Number of modes `k_b`.
+    pub fn modes(&self) -> usize {
+        self.indirect_basis.columns()
+    }
+}

@@ -1,0 +1,117 @@
+//! Direct light at the texels: the first stage of a frame (Loos et al. 2011, section 7.3, step 1).
+
+use crate::light::{Light, PlacedLight};
+use crate::scene::Scene;
+use crate::visibility::{Receiver, Toward, Visibility};
+use glam::{DVec3, Vec3};
+use mrt_core::radiometry::sphere_light_irradiance;
+
+/// Writes direct irradiance, W/m², for all texels: block by block, and in a block channel by channel.
+///
+/// Cost: one evaluation and one visibility query a texel and light.
+pub(crate) fn direct_light<V: Visibility>(
+    scene: &Scene,
+    lights: &[PlacedLight],
+    visibility: &V,
+    direct: &mut [f32],
+) {
+    for (index, block) in scene.blocks.iter().enumerate() {
+        let count = block.texels.len();
+        let out = &mut direct[3 * block.texels.start..3 * block.texels.end];
+        let (red, rest) = out.split_at_mut(count);
+        let (green, blue) = rest.split_at_mut(count);
+        for (k, texel) in block.texels.clone().enumerate() {
+            let position = scene.texel_positions[texel].as_dvec3();
+            let normal = scene.texel_normals[texel].as_dvec3();
+            let receiver = Receiver {
+                block: index,
+                position,
+            };
+            let mut sum = Vec3::ZERO;
+            for light in lights {
+                sum += irradiance(scene, light, receiver, normal, visibility);
+            }
+            (red[k], green[k], blue[k]) = (sum.x, sum.y, sum.z);
+        }
+    }
+}
+
+/// Irradiance from one light at one point.
+fn irradiance<V: Visibility>(
+    scene: &Scene,
+    placed: &PlacedLight,
+    receiver: Receiver,
+    normal: DVec3,
+    visibility: &V,
+) -> Vec3 {
+    let (toward, unshadowed) = match (placed.light, placed.block) {
+        (
+            Light::Directional {
+                direction,
+                irradiance,
+            },
+            _,
+        ) => {
+            let to_light = -direction.as_dvec3().normalize();
+            let cosine = normal.dot(to_light).max(0.0) as f32;
+            (Toward::Infinity(to_light), irradiance * cosine)
+        }
+        (
+            Light::Sphere {
+                position,
+                radius,
+                intensity,
+            },
+            Some(block),
+        ) => {
+            let position = position.as_dvec3();
+            let offset = position - receiver.position;
+            let factor = bounded_irradiance(offset, normal, radius);
+            (Toward::Point { position, block }, intensity * factor)
+        }
+        (
+            Light::Spot {
+                position,
+                radius,
+                intensity,
+                direction,
+                inner_angle,
+                outer_angle,
+            },
+            Some(block),
+        ) => {
+            let position = position.as_dvec3();
+            let offset = position - receiver.position;
+            let cone = cone_falloff(-offset, direction.as_dvec3(), inner_angle, outer_angle);
+            let factor = cone * bounded_irradiance(offset, normal, radius);
+            (Toward::Point { position, block }, intensity * factor)
+        }
+        // Lights with a position always have a block; see `light::place`.
+        _ => return Vec3::ZERO,
+    };
+    if unshadowed == Vec3::ZERO {
+        return Vec3::ZERO;
+    }
+    unshadowed * visibility.fraction(scene, receiver, toward)
+}
+
+/// Distance, metres, below which a light of smaller radius no longer gets brighter: it keeps products
+/// with the brightest light finite in `f32`.
+const MIN_RADIUS: f64 = 1e-6;
+
+fn bounded_irradiance(offset: DVec3, normal: DVec3, radius: f32) -> f32 {
+    sphere_light_irradiance(offset, normal, f64::from(radius).max(MIN_RADIUS)) as f32
+}
+
+/// 1 within the inner angle, 0 beyond the outer one, smooth between.
+fn cone_falloff(from_light: DVec3, axis: DVec3, inner: f32, outer: f32) -> f32 {
+    let angle = from_light.angle_between(axis) as f32;
+    if angle <= inner {
+        return 1.0;
+    }
+    if angle >= outer {
+        return 0.0;
+    }
+    let t = (outer - angle) / (outer - inner);
+    t * t * (3.0 - 2.0 * t)
+}

@@ -1,0 +1,301 @@
+//! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
+
+use crate::direct::direct_light;
+use crate::light::{Light, LightError, PlacedLight, place};
+use crate::scene::Scene;
+use crate::visibility::Visibility;
+use mrt_core::matrix::{MatrixView, multiply_add};
+use std::time::{Duration, Instant};
+
+/// Lights in one frame, at most.
+pub const MAX_LIGHTS: usize = 1024;
+
+/// Which bounces a frame computes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Bounces {
+    /// This many, each a pass over the reduced operators; 0 leaves indirect light at zero.
+    Count(u32),
+    /// One pass that reflects the previous frame's indirect light with this frame's direct light: many
+    /// bounces over a few frames at the cost of one.
+    Feedback,
+    /// Passes until no texel changes by more than `tolerance` of the brightest, at most `limit`.
+    Converged {
+        /// Relative change at which to stop.
+        tolerance: f32,
+        /// Most passes.
+        limit: u32,
+    },
+}
+
+/// Time of each stage of the last frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageTimes {
+    /// Direct light.
+    pub direct: Duration,
+    /// `b = T_d->b l`.
+    pub coefficients: Duration,
+    /// `r = T_b->r b`.
+    pub responses: Duration,
+    /// `U_b b`.
+    pub own_indirect: Duration,
+    /// `U_r r`.
+    pub foreign_indirect: Duration,
+    /// Lightmap atlas.
+    pub atlas: Duration,
+}
+
+/// The buffers of a frame, made once for a scene; frames allocate nothing.
+///
+/// Signals on texels are stored block by block, in a block channel by channel (red, green, blue), and in a
+/// channel texel by texel in the canonical shape's order.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    lights: Vec<PlacedLight>,
+    direct: Vec<f32>,
+    radiosity: Vec<f32>,
+    coefficients: Vec<f32>,
+    responses: Vec<f32>,
+    indirect: Vec<f32>,
+    previous: Vec<f32>,
+    lightmap: Vec<[f32; 3]>,
+    times: StageTimes,
+    passes: u32,
+}
+
+/// Why a frame was not computed; its results are those of the frame before.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum FrameError {
+    /// A light is refused.
+    #[error(transparent)]
+    Light(#[from] LightError),
+    /// Above [`MAX_LIGHTS`].
+    #[error("the frame has {found} lights; expected at most {MAX_LIGHTS}")]
+    TooManyLights {
+        /// Lights given.
+        found: usize,
+    },
+    /// The buffers were made for a scene of another size.
+    #[error("the frame's buffers hold {expected} texels; the scene has {found}")]
+    OtherScene {
+        /// Texels of the scene that the buffers were made for.
+        expected: usize,
+        /// Texels of the scene given.
+        found: usize,
+    },
+}
+
+impl Frame {
+    /// Buffers for frames of a scene, all dark.
+    pub fn new(scene: &Scene) -> Self {
+        let texels = 3 * scene.texel_count();
+        Self {
+            lights: Vec::with_capacity(MAX_LIGHTS),
+            direct: vec![0.0; texels],
+            radiosity: vec![0.0; texels],
+            coefficients: vec![0.0; 3 * scene.coefficient_count],
+            responses: vec![0.0; 3 * scene.response_count],
+            indirect: vec![0.0; texels],
+            previous: vec![0.0; texels],
+            lightmap: vec![[0.0; 3]; scene.atlas.width * scene.atlas.height],
+            times: StageTimes::default(),
+            passes: 0,
+        }
+    }
+
+    /// Computes direct and indirect irradiance for the lights.
+    ///
+    /// # Errors
+    /// [`FrameError`]; the frame then holds what it held before.
+    pub fn solve<V: Visibility>(
+        &mut self,
+        scene: &Scene,
+        lights: &[Light],
+        visibility: &V,
+        bounces: Bounces,
+    ) -> Result<(), FrameError> {
+        self.check(scene, lights)?;
+        let start = Instant::now();
+        direct_light(scene, &self.lights, visibility, &mut self.direct);
+        self.times = StageTimes {
+            direct: start.elapsed(),
+            ..StageTimes::default()
+        };
+        self.bounce(scene, bounces);
+        let start = Instant::now();
+        scene
+            .atlas
+            .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
+        self.times.atlas = start.elapsed();
+        Ok(())
+    }
+
+    /// As [`Frame::solve`], for direct irradiance that the caller computed, in this struct's order.
+    ///
+    /// # Panics
+    /// If the length is not three values a texel.
+    pub fn solve_from_direct(&mut self, scene: &Scene, direct: &[f32], bounces: Bounces) {
+        self.direct.copy_from_slice(direct);
+        self.times = StageTimes::default();
+        self.bounce(scene, bounces);
+        scene
+            .atlas
+            .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
+    }
+
+    fn check(&mut self, scene: &Scene, lights: &[Light]) -> Result<(), FrameError> {
+        if 3 * scene.texel_count() != self.direct.len() {
+            return Err(FrameError::OtherScene {
+                expected: self.direct.len() / 3,
+                found: scene.texel_count(),
+            });
+        }
+        if lights.len() > MAX_LIGHTS {
+            return Err(FrameError::TooManyLights {
+                found: lights.len(),
+            });
+        }
+        for (index, &light) in lights.iter().enumerate() {
+            place(scene, index, light)?;
+        }
+        self.lights.clear();
+        for (index, &light) in lights.iter().enumerate() {
+            self.lights.push(place(scene, index, light)?);
+        }
+        Ok(())
+    }
+
+    fn bounce(&mut self, scene: &Scene, bounces: Bounces) {
+        let (limit, tolerance) = match bounces {
+            Bounces::Count(count) => (count, None),
+            Bounces::Feedback => (1, None),
+            Bounces::Converged { tolerance, limit } => (limit, Some(tolerance)),
+        };
+        if bounces != Bounces::Feedback {
+            self.indirect.fill(0.0);
+        }
+        self.passes = 0;
+        while self.passes < limit {
+            if tolerance.is_some() {
+                self.previous.copy_from_slice(&self.indirect);
+            }
+            self.pass(scene);
+            self.passes += 1;
+            if tolerance.is_some_and(|t| largest_change(&self.previous, &self.indirect) <= t) {
+                break;
+            }
+        }
+    }
+
+    /// One bounce of everything that the walls reflect now.
+    fn pass(&mut self, scene: &Scene) {
+        let start = Instant::now();
+        reflect(scene, &self.direct, &self.indirect, &mut self.radiosity);
+        coefficients_from_radiosity(scene, &self.radiosity, &mut self.coefficients);
+        let after_coefficients = Instant::now();
+        scene
+            .response_from_coefficients
+            .multiply(&self.coefficients, 3, &mut self.responses);
+        let after_responses = Instant::now();
+        own_indirect(scene, &self.coefficients, &mut self.indirect);
+        let after_own = Instant::now();
+        add_foreign_indirect(scene, &self.responses, &mut self.indirect);
+        // Truncated bases leave small negative values; they end here, once, on the final sum.
+        self.indirect.iter_mut().for_each(|e| *e = e.max(0.0));
+        let end = Instant::now();
+        self.times.coefficients += after_coefficients - start;
+        self.times.responses += after_responses - after_coefficients;
+        self.times.own_indirect += after_own - after_responses;
+        self.times.foreign_indirect += end - after_own;
+    }
+
+    /// Direct irradiance, W/m².
+    pub fn direct(&self) -> &[f32] {
+        &self.direct
+    }
+
+    /// Indirect irradiance, W/m², not multiplied by the receiving texel's albedo.
+    pub fn indirect(&self) -> &[f32] {
+        &self.indirect
+    }
+
+    /// Coefficients b: block by block, channel by channel.
+    pub fn coefficients(&self) -> &[f32] {
+        &self.coefficients
+    }
+
+    /// Padded lightmap of indirect irradiance, row by row; see [`Scene::atlas`].
+    pub fn lightmap(&self) -> &[[f32; 3]] {
+        &self.lightmap
+    }
+
+    /// Time that each stage took, summed over the passes.
+    pub fn times(&self) -> StageTimes {
+        self.times
+    }
+
+    /// Passes of the last frame.
+    pub fn passes(&self) -> u32 {
+        self.passes
+    }
+}
+
+/// radiosity = albedo (direct + indirect)
+fn reflect(scene: &Scene, direct: &[f32], indirect: &[f32], radiosity: &mut [f32]) {
+    for block in &scene.blocks {
+        let count = block.texels.len();
+        for channel in 0..3 {
+            let start = 3 * block.texels.start + channel * count;
+            for (k, texel) in block.texels.clone().enumerate() {
+                let incident = direct[start + k] + indirect[start + k];
+                radiosity[start + k] = scene.texel_albedo[texel][channel] * incident;
+            }
+        }
+    }
+}
+
+/// `b = T_d->b l`
+fn coefficients_from_radiosity(scene: &Scene, radiosity: &[f32], coefficients: &mut [f32]) {
+    coefficients.fill(0.0);
+    for block in &scene.blocks {
+        let operator = &scene.shapes[block.shape_index].coefficients_from_direct;
+        let light = &radiosity[3 * block.texels.start..3 * block.texels.end];
+        let out = &mut coefficients[3 * block.coefficients.start..3 * block.coefficients.end];
+        let light = MatrixView::new(block.texels.len(), 3, light);
+        multiply_add(operator.view(), light, out);
+    }
+}
+
+/// `U_b b`
+fn own_indirect(scene: &Scene, coefficients: &[f32], indirect: &mut [f32]) {
+    indirect.fill(0.0);
+    for block in &scene.blocks {
+        let basis = &scene.shapes[block.shape_index].indirect_basis;
+        let b = &coefficients[3 * block.coefficients.start..3 * block.coefficients.end];
+        let b = MatrixView::new(block.coefficients.len(), 3, b);
+        let out = &mut indirect[3 * block.texels.start..3 * block.texels.end];
+        multiply_add(basis.view(), b, out);
+    }
+}
+
+/// `+ U_r r`
+fn add_foreign_indirect(scene: &Scene, responses: &[f32], indirect: &mut [f32]) {
+    for block in &scene.blocks {
+        let out = &mut indirect[3 * block.texels.start..3 * block.texels.end];
+        for interface in &block.interfaces {
+            let basis = &scene.shapes[block.shape_index].response_bases[interface.opening];
+            let range = &interface.responses;
+            let r = &responses[3 * range.start..3 * range.end];
+            multiply_add(basis.view(), MatrixView::new(range.len(), 3, r), out);
+        }
+    }
+}
+
+/// Largest difference over the largest value.
+fn largest_change(before: &[f32], after: &[f32]) -> f32 {
+    let largest = after.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+    let change = before
+        .iter()
+        .zip(after)
+        .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+    if largest > 0.0 { change / largest } else { 0.0 }
+}

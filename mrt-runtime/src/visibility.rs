@@ -1,0 +1,124 @@
+//! Shadows of direct light: by the level's openings, or by rays of the caller's.
+
+use crate::scene::{Beyond, Scene};
+use glam::DVec3;
+
+/// A surface point that asks for light.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// The block that it belongs to.
+    pub block: usize,
+    /// World position, metres.
+    pub position: DVec3,
+}
+
+/// Where the light comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Toward {
+    /// A light at a point of a block.
+    Point {
+        /// World position, metres.
+        position: DVec3,
+        /// The block that it stands in.
+        block: usize,
+    },
+    /// A light at infinity; the unit vector points to it.
+    Infinity(DVec3),
+}
+
+/// Decides what part of a light reaches a point.
+pub trait Visibility {
+    /// Fraction in [0, 1] of the light that arrives.
+    fn fraction(&self, scene: &Scene, receiver: Receiver, toward: Toward) -> f32;
+}
+
+/// Light goes where the level's openings let it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Openings;
+
+impl Visibility for Openings {
+    fn fraction(&self, scene: &Scene, receiver: Receiver, toward: Toward) -> f32 {
+        if passes_openings(scene, receiver, toward) {
+            1.0
+        } else {
+            0.0
+        }
+    }
+}
+
+/// Light goes where the caller's function says, such as a ray cast into the real mesh.
+///
+/// The function gets the receiver's position and the light's, both in metres, the latter pushed
+/// [`RAY_REACH`] away for lights at infinity, and returns the fraction in [0, 1] that arrives. Light still
+/// crosses walls of blocks only where the function lets it: openings are not asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays<F>(pub F);
+
+/// Distance, metres, at which [`Rays`] puts lights at infinity.
+pub const RAY_REACH: f64 = 1e6;
+
+impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
+    fn fraction(&self, _: &Scene, receiver: Receiver, toward: Toward) -> f32 {
+        let target = match toward {
+            Toward::Point { position, .. } => position,
+            Toward::Infinity(direction) => receiver.position + direction * RAY_REACH,
+        };
+        (self.0)(receiver.position, target).clamp(0.0, 1.0)
+    }
+}
+
+/// Follows the segment from the receiver through connected openings until it is in the light's
+/// block, or outside for lights at infinity.
+///
+/// Blocks are convex, so inside one nothing is in the way.
+fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
+    let (direction, goal) = match toward {
+        Toward::Point { position, block } => (position - receiver.position, Some(block)),
+        Toward::Infinity(direction) => (direction, None),
+    };
+    let mut here = receiver.block;
+    let mut entered = None;
+    // A straight line enters each block at most once.
+    for _ in 0..scene.blocks.len() {
+        if Some(here) == goal {
+            return true;
+        }
+        let block = &scene.blocks[here];
+        let exit = block.shape.openings.iter().copied().find(|&face| {
+            Some(face) != entered
+                && leaves_through(
+                    &block.warp.face_corners(face),
+                    block.warp.center(),
+                    receiver.position,
+                    direction,
+                )
+        });
+        match exit.map(|face| block.beyond[face.index()]) {
+            Some(Beyond::Block { block, face, .. }) => {
+                here = block;
+                entered = Some(face);
+            }
+            Some(Beyond::Outside) => return goal.is_none(),
+            Some(Beyond::Wall) | None => return false,
+        }
+    }
+    false
+}
+
+/// True when the line from `origin` along `direction` passes the loop of four corners outwards, away
+/// from `inside`.
+///
+/// The line passes a loop when it runs on the same side of all four edges; that depends on the corners
+/// alone, so the blocks on both sides of an opening agree, bent openings included.
+fn leaves_through(corners: &[DVec3; 4], inside: DVec3, origin: DVec3, direction: DVec3) -> bool {
+    let middle = corners.iter().copied().sum::<DVec3>() / 4.0;
+    let turn = (corners[1] - corners[0]).cross(corners[3] - corners[0]);
+    let outward = turn.dot(middle - inside).signum();
+    if direction.dot(turn) * outward <= 0.0 {
+        return false;
+    }
+    (0..4).all(|k| {
+        let (a, b) = (corners[k] - origin, corners[(k + 1) % 4] - origin);
+        a.cross(b).dot(direction) * outward >= 0.0
+    })
+}

@@ -1,0 +1,139 @@
+//! Direct light with exact visibility: a walk from texel to light, block by block.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::transport::Quarters;
+use super::{ExactScene, Side, winding};
+
+/// An isotropic diffuse sphere, or a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PointLight {
+    /// World position of the centre; a light outside all blocks lights nothing.
+    pub position: DVec3,
+    /// W/sr.
+    pub intensity: f64,
+    /// Metres; 0 for a point. Nearer than this, irradiance grows no further.
+    pub radius: f64,
+}
+
+impl PointLight {
+    /// A point of unit intensity, as in the reference files.
+    pub fn unit(position: DVec3) -> Self {
+        Self {
+            position,
+            intensity: 1.0,
+            radius: 0.0,
+        }
+    }
+}
+
+/// Direct irradiance at every texel centre, W/m²: I cos / max(d², r²) where the centre of the light
+/// is visible.
+pub fn direct(scene: &ExactScene, light: &PointLight) -> Vec<f64> {
+    direct_on_grid(scene, light, 1, 1)
+}
+
+/// Direct irradiance as the area mean over `samples`² points of every texel, W/m².
+pub fn direct_mean(scene: &ExactScene, light: &PointLight, samples: usize) -> Vec<f64> {
+    direct_on_grid(scene, light, 1, samples)
+}
+
+/// Direct irradiance as the area means over `samples`² points of every quarter of a texel, W/m².
+///
+/// The source of indirect light: what a texel sends out is its mean, not its centre's value, and
+/// direct light varies most within a texel where it is strongest. Cost: one walk a point, about 0.1
+/// microseconds.
+pub fn direct_quarters(scene: &ExactScene, light: &PointLight, samples: usize) -> Vec<Quarters> {
+    let resolution = scene.resolution;
+    let fine = direct_on_grid(scene, light, 2, samples);
+    let quarters = |texel: usize| {
+        let (row, column) = (texel / resolution, texel % resolution);
+        let corner = 4 * row * resolution + 2 * column;
+        [0, 1, 2 * resolution, 2 * resolution + 1].map(|offset| fine[corner + offset])
+    };
+    (0..scene.texel_count()).map(quarters).collect()
+}
+
+/// Means over `samples`² points of every cell of a grid `refinement` times finer than the texels.
+fn direct_on_grid(
+    scene: &ExactScene,
+    light: &PointLight,
+    refinement: usize,
+    samples: usize,
+) -> Vec<f64> {
+    let samples = samples.max(1);
+    let resolution = scene.resolution * refinement;
+    let step = 1.0 / (resolution * samples) as f64;
+    let cell_mean = |cell: usize| {
+        let wall = scene.walls[cell / (resolution * resolution)];
+        let block = &scene.blocks[wall.block];
+        let (row, column) = (cell / resolution % resolution, cell % resolution);
+        let (mut sum, mut area) = (0.0, 0.0);
+        for j in row * samples..(row + 1) * samples {
+            for i in column * samples..(column + 1) * samples {
+                let unit = wall
+                    .face
+                    .point((i as f64 + 0.5) * step, (j as f64 + 0.5) * step);
+                let jacobian = block.jacobian(unit);
+                let (along_u, along_v) = (wall.face.u_axis(), wall.face.v_axis());
+                let normal = jacobian.col(along_u).cross(jacobian.col(along_v));
+                let weight = normal.length();
+                let inward = normal * (winding(wall.face) / weight);
+                sum += weight * direct_at(scene, wall.block, block.point(unit), inward, light);
+                area += weight;
+            }
+        }
+        sum / area
+    };
+    (0..scene.walls.len() * resolution * resolution)
+        .into_par_iter()
+        .map(cell_mean)
+        .collect()
+}
+
+fn direct_at(
+    scene: &ExactScene,
+    block: usize,
+    point: DVec3,
+    normal: DVec3,
+    light: &PointLight,
+) -> f64 {
+    let to_light = light.position - point;
+    let squared = to_light.length_squared();
+    let cosine = normal.dot(to_light) / squared.sqrt();
+    // NaN, for a point light on the surface itself, is no light either.
+    if cosine.is_nan() || cosine <= 0.0 || !is_visible(scene, block, point, to_light) {
+        return 0.0;
+    }
+    light.intensity * cosine / squared.max(light.radius * light.radius)
+}
+
+/// True when the segment from `point`, in or on `block`, to `point + to_light` meets only openings.
+fn is_visible(scene: &ExactScene, mut block: usize, point: DVec3, to_light: DVec3) -> bool {
+    // Segments through an edge belong to several faces; within rounding, an opening wins.
+    const TIE: f64 = 1e-12;
+    // Each block is crossed once at most.
+    for _ in 0..scene.blocks.len() {
+        let mut exit = (1.0, None);
+        for (side, facets) in scene.sides[block].iter().zip(&scene.facets[block]) {
+            for facet in facets {
+                let speed = facet.plane.normal.dot(to_light);
+                if speed >= 0.0 {
+                    continue;
+                }
+                let t = -facet.plane.side(point) / speed;
+                let tied = (t - exit.0).abs() <= TIE && matches!(side, Side::Opening(..));
+                if t < exit.0 - TIE || (tied && exit.1.is_some()) {
+                    exit = (t, Some(side));
+                }
+            }
+        }
+        match exit.1 {
+            None => return true,
+            Some(Side::Opening(next, _)) => block = *next,
+            Some(Side::Wall | Side::Sky) => return false,
+        }
+    }
+    false
+}
