@@ -102,6 +102,16 @@ impl Face {
         ]
     }
 
+    /// Index on the face, row by row, of the texel that holds a point of it; points outside count to the
+    /// nearest texel.
+    pub fn texel_index(self, point: DVec3, resolution: usize) -> usize {
+        let along = |axis: usize| {
+            let k = (point[axis] * resolution as f64).floor();
+            k.clamp(0.0, resolution.saturating_sub(1) as f64) as usize
+        };
+        along(self.v_axis()) * resolution + along(self.u_axis())
+    }
+
     /// "-x", "+x", ...
     pub fn name(self) -> &'static str {
         ["-x", "+x", "-y", "+y", "-z", "+z"][self.index()]

@@ -42,8 +42,13 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
         basis = enriched_basis(&grid, &classes, &basis, &config.lightfield, progress)?;
     }
     progress.step("lightfield operators", step + 1, steps)?;
-    let interface =
-        interface_operators(&grid, &basis, &config.lightfield, config.resolution, progress)?;
+    let interface = interface_operators(
+        &grid,
+        &basis,
+        &config.lightfield,
+        config.resolution,
+        progress,
+    )?;
     progress.step("projections", step + 2, steps)?;
     Ok(pack(config, transports, &emitted, &basis, &interface))
 }
@@ -124,6 +129,7 @@ fn pack(
         .collect();
     Dictionary {
         preset: config.preset.clone(),
+        settings: config.describe(),
         resolution: config.resolution,
         shapes,
         interface: dictionary::InterfaceOperators {

@@ -1,5 +1,7 @@
 //! Settings of a bake and the named presets.
 
+use mrt_runtime::dictionary_file::{MAX_MODES, MAX_RESOLUTION};
+
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeConfig {
@@ -7,7 +9,7 @@ pub struct BakeConfig {
     pub preset: String,
     /// Texels along an edge of a wall.
     pub resolution: usize,
-    /// Largest number of modes `k_b`.
+    /// Largest number of modes `k_b`; fewer are kept where a multiplet would be cut.
     pub modes: usize,
     /// The light prior.
     pub prior: PriorConfig,
@@ -24,7 +26,7 @@ pub struct PriorConfig {
     pub lights_per_axis: usize,
     /// Radius of the sphere lights, in block widths.
     pub light_radius: f64,
-    /// Vectors kept, `k_d`. It costs nothing at run time.
+    /// Vectors kept, `k_d`, at most. They cost nothing at run time, so presets keep all of them.
     pub k_d: usize,
 }
 
@@ -46,9 +48,9 @@ pub struct LightfieldConfig {
     pub directions: usize,
     /// Super-samples along each axis of a direction cell.
     pub super_samples: usize,
-    /// Lightfield modes `k_rlf`.
+    /// Lightfield modes `k_rlf`, at most.
     pub lightfield_modes: usize,
-    /// Response modes `k_r`.
+    /// Response modes `k_r`, at most.
     pub response_modes: usize,
     /// Rounds of interface enrichment (appendix A).
     pub enrichment_rounds: usize,
@@ -56,7 +58,194 @@ pub struct LightfieldConfig {
     pub enrichment_weight: f64,
 }
 
+/// A setting out of range.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// No preset of that name.
+    #[error("preset `{found}`; expected one of {}", PRESETS.join(", "))]
+    UnknownPreset {
+        /// The name given.
+        found: String,
+    },
+    /// A count or weight out of range.
+    #[error("{what} is {found}; expected {low} to {high}")]
+    OutOfRange {
+        /// Which setting.
+        what: &'static str,
+        /// Smallest accepted.
+        low: f64,
+        /// Largest accepted.
+        high: f64,
+        /// The value given.
+        found: f64,
+    },
+}
+
+/// Names of the presets.
+pub const PRESETS: [&str; 3] = ["mobile", "standard", "quality"];
+
+impl BakeConfig {
+    /// A named preset: `mobile` (6² texels, 12 modes), `standard` (16², 32) or `quality` (16², 96).
+    ///
+    /// # Errors
+    /// [`ConfigError::UnknownPreset`].
+    pub fn preset(name: &str) -> Result<Self, ConfigError> {
+        let (resolution, modes, lightfield_modes, response_modes) = match name {
+            "mobile" => (6, 12, 64, 12),
+            "standard" => (16, 32, 128, 32),
+            "quality" => (16, 96, 192, 64),
+            _ => {
+                return Err(ConfigError::UnknownPreset {
+                    found: name.to_owned(),
+                });
+            }
+        };
+        Ok(Self {
+            preset: name.to_owned(),
+            resolution,
+            modes,
+            prior: PriorConfig::default(),
+            enrichment: Some(Enrichment::default()),
+            lightfield: LightfieldConfig {
+                lightfield_modes,
+                response_modes,
+                ..LightfieldConfig::default()
+            },
+        })
+    }
+
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// [`ConfigError::OutOfRange`], for the first that is not within its bounds.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        let lightfield = &self.lightfield;
+        let max_modes = MAX_MODES as f64;
+        let max_resolution = MAX_RESOLUTION as f64;
+        let weights = self
+            .enrichment
+            .as_ref()
+            .map_or([0.0; 2], |e| [e.constant_weight, e.indirect_weight]);
+        let ranges = [
+            ("resolution", self.resolution as f64, 1.0, max_resolution),
+            ("number of modes", self.modes as f64, 1.0, max_modes),
+            (
+                "lights per axis",
+                self.prior.lights_per_axis as f64,
+                1.0,
+                32.0,
+            ),
+            ("light radius", self.prior.light_radius, 0.0, 1.0),
+            ("k_d", self.prior.k_d as f64, 1.0, f64::INFINITY),
+            ("constant weight", weights[0], 0.0, 100.0),
+            ("indirect weight", weights[1], 0.0, 100.0),
+            (
+                "lightfield positions",
+                lightfield.positions as f64,
+                1.0,
+                64.0,
+            ),
+            (
+                "lightfield directions",
+                lightfield.directions as f64,
+                2.0,
+                64.0,
+            ),
+            ("super-samples", lightfield.super_samples as f64, 1.0, 9.0),
+            (
+                "number of lightfield modes",
+                lightfield.lightfield_modes as f64,
+                1.0,
+                max_modes,
+            ),
+            (
+                "number of response modes",
+                lightfield.response_modes as f64,
+                1.0,
+                max_modes,
+            ),
+            (
+                "enrichment rounds",
+                lightfield.enrichment_rounds as f64,
+                0.0,
+                8.0,
+            ),
+            (
+                "enrichment weight",
+                lightfield.enrichment_weight,
+                0.0,
+                100.0,
+            ),
+        ];
+        for (what, found, low, high) in ranges {
+            if !(low..=high).contains(&found) {
+                return Err(ConfigError::OutOfRange {
+                    what,
+                    low,
+                    high,
+                    found,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The settings as text for people, kept in the file.
+    pub fn describe(&self) -> String {
+        let enrichment = match &self.enrichment {
+            None => "not enriched".to_owned(),
+            Some(e) => format!(
+                "enriched (constant faces {}, indirect {})",
+                e.constant_weight, e.indirect_weight
+            ),
+        };
+        let (prior, field) = (&self.prior, &self.lightfield);
+        let k_d = match prior.k_d {
+            usize::MAX => "all".to_owned(),
+            k_d => k_d.to_string(),
+        };
+        format!(
+            "{0}² texels a wall, k_b <= {1}; prior of {2}³ lights of radius {3} inside and beyond each \
+             opening, k_d {k_d}, {enrichment}; lightfields of {4}² positions x {5}² directions with {6}² \
+             super-samples, k_rlf <= {7}, k_r <= {8}, {9} enrichment rounds of weight {10}",
+            self.resolution,
+            self.modes,
+            prior.lights_per_axis,
+            prior.light_radius,
+            field.positions,
+            field.directions,
+            field.super_samples,
+            field.lightfield_modes,
+            field.response_modes,
+            field.enrichment_rounds,
+            field.enrichment_weight,
+        )
+    }
+}
+
+impl Default for PriorConfig {
+    /// The paper's 6³ lights (section 7.1), and every vector that they span.
+    fn default() -> Self {
+        Self {
+            lights_per_axis: 6,
+            light_radius: 0.1,
+            k_d: usize::MAX,
+        }
+    }
+}
+
+impl Default for Enrichment {
+    fn default() -> Self {
+        Self {
+            constant_weight: 0.2,
+            indirect_weight: 0.2,
+        }
+    }
+}
+
 impl Default for LightfieldConfig {
+    /// The paper's resolution and mode counts (section 7.1), with the super-sampling and the single round
+    /// of enrichment that measured best.
     fn default() -> Self {
         Self {
             positions: 12,
@@ -67,5 +256,27 @@ impl Default for LightfieldConfig {
             enrichment_rounds: 1,
             enrichment_weight: 1.0,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_in_range_and_zero_modes_are_not() {
+        for name in PRESETS {
+            let mut config = BakeConfig::preset(name).expect("a preset");
+            assert_eq!(config.check(), Ok(()));
+            config.modes = 0;
+            assert!(matches!(
+                config.check(),
+                Err(ConfigError::OutOfRange {
+                    what: "number of modes",
+                    ..
+                })
+            ));
+        }
+        assert!(BakeConfig::preset("ultra").is_err());
     }
 }

@@ -6,6 +6,7 @@
 
 use crate::config::LightfieldConfig;
 use crate::lightfield::{LightfieldGrid, frame_of_heading};
+use crate::prior::root_sum_of_squares;
 use crate::progress::{Cancelled, Progress};
 use crate::symmetry::texel_parity_classes;
 use crate::transport::whole_multiplets;
@@ -79,7 +80,7 @@ pub fn emitted_lightfield(
                 continue;
             };
             let hit = frame.point(hit);
-            let texel = offset + texel_at(frame.face(face), hit, resolution);
+            let texel = offset + frame.face(face).texel_index(hit, resolution);
             for (value, &radiosity) in out.iter_mut().zip(by_texel.column(texel)) {
                 *value += radiosity;
             }
@@ -107,15 +108,6 @@ fn wall_behind(point: DVec3, toward: DVec3) -> (Face, DVec3) {
     }
     let (distance, face) = nearest;
     (face, point - toward * distance)
-}
-
-/// Index within a face of the texel that holds a point of it.
-fn texel_at(face: Face, point: DVec3, resolution: usize) -> usize {
-    let along = |axis: usize| {
-        let k = (point[axis] * resolution as f64).floor();
-        k.clamp(0.0, (resolution - 1) as f64) as usize
-    };
-    along(face.v_axis()) * resolution + along(face.u_axis())
 }
 
 /// Decomposes flux-weighted lightfields (samples x columns), class by class, keeping the largest
@@ -283,15 +275,11 @@ pub fn enriched_basis(
     let left = propagated(grid, &scaled, Exit::Left);
     progress.check()?;
     let right = mirrored_columns(classes, &left);
-    let norm = |parts: &[&Matrix<f64>]| {
-        parts
-            .iter()
-            .map(|m| m.frobenius_norm().powi(2))
-            .sum::<f64>()
-            .sqrt()
-    };
-    let own = norm(&[&scaled]);
-    let weight = config.enrichment_weight * own / norm(&[&straight, &left, &right]);
+    let own = scaled.frobenius_norm();
+    let sent = [&straight, &left, &right]
+        .into_iter()
+        .map(Matrix::frobenius_norm);
+    let weight = config.enrichment_weight * own / root_sum_of_squares(sent);
     let rescale = |m: Matrix<f64>| {
         let scales = vec![weight; m.columns()];
         m.scaled_columns(&scales)
@@ -321,7 +309,13 @@ pub fn interface_operators(
     let left = project(&propagated(grid, &basis.vectors, Exit::Left));
     progress.check()?;
     // The mirror of u changes the sign of odd modes and exchanges left and right.
-    let sign = |mode: usize| if basis.classes[mode] & 1 == 1 { -1.0 } else { 1.0 };
+    let sign = |mode: usize| {
+        if basis.classes[mode] & 1 == 1 {
+            -1.0
+        } else {
+            1.0
+        }
+    };
     let right = Matrix::from_fn(left.rows(), left.columns(), |i, j| {
         left[(i, j)] * sign(i) * sign(j)
     });
@@ -353,10 +347,7 @@ pub fn interface_operators(
 }
 
 /// `R_b->rlf` for one opening: what a shape with the given implicit lighting sends out, in the basis.
-pub fn lightfield_from_coefficients(
-    basis: &LightfieldBasis,
-    emitted: &Matrix<f64>,
-) -> Matrix<f64> {
+pub fn lightfield_from_coefficients(basis: &LightfieldBasis, emitted: &Matrix<f64>) -> Matrix<f64> {
     parallel_transpose_multiply(&basis.vectors, emitted)
 }
 

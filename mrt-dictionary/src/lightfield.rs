@@ -106,9 +106,8 @@ impl LightfieldGrid {
             for (i, wi) in pu {
                 for (y, wy) in dy {
                     for (x, wx) in dx {
-                        let sample = ((j * self.positions + i) * self.directions + y)
-                            * self.directions
-                            + x;
+                        let sample =
+                            ((j * self.positions + i) * self.directions + y) * self.directions + x;
                         taps[next] = (sample, wj * wi * wy * wx);
                         next += 1;
                     }
@@ -136,7 +135,10 @@ impl LightfieldGrid {
                 })
                 .collect()
         };
-        ParityClasses::new(self.sample_count(), &[permutation(true), permutation(false)])
+        ParityClasses::new(
+            self.sample_count(),
+            &[permutation(true), permutation(false)],
+        )
     }
 
     /// Evaluates `modes` signals at all samples in parallel, one position after the other:
@@ -209,11 +211,14 @@ mod tests {
     fn weights_measure_the_flux_of_unit_radiance() {
         let grid = grid();
         let flux: f64 = (0..grid.sample_count())
-            .map(|s| grid.root_weight(s).powi(2))
+            .map(|s| grid.root_weight(s) * grid.root_weight(s))
             .sum();
         // The mean cosine over equal solid angles is 1/2; the midpoint rule over 12² directions is
         // off by 1/12² of it.
-        assert!((flux / std::f64::consts::PI - 1.0).abs() < 1.1 / 144.0, "{flux}");
+        assert!(
+            (flux / std::f64::consts::PI - 1.0).abs() < 1.1 / 144.0,
+            "{flux}"
+        );
     }
 
     #[test]

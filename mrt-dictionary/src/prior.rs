@@ -2,6 +2,7 @@
 //! its enrichment (appendix A).
 
 use crate::config::{Enrichment, PriorConfig};
+use crate::transport::whole_multiplets;
 use glam::DVec3;
 use mrt_core::cube::Face;
 use mrt_core::matrix::Matrix;
@@ -92,11 +93,7 @@ pub fn enriched_prior(
         .map(|class| {
             let mut columns: Vec<Vec<f64>> = Vec::new();
             for (weight, part) in &parts {
-                let norm = part
-                    .iter()
-                    .map(|m| m.frobenius_norm().powi(2))
-                    .sum::<f64>()
-                    .sqrt();
+                let norm = root_sum_of_squares(part.iter().map(Matrix::frobenius_norm));
                 for j in 0..part[class].columns() {
                     let scale = weight / norm;
                     columns.push(part[class].column(j).iter().map(|x| x * scale).collect());
@@ -114,8 +111,13 @@ fn fold_all(classes: &ParityClasses, signals: &Matrix<f64>) -> Vec<Matrix<f64>> 
         .collect()
 }
 
-/// Left singular vectors times singular values, class by class, keeping the `keep` largest overall
-/// that are not lost in rounding.
+/// Norm of a matrix from the norms of its parts.
+pub(crate) fn root_sum_of_squares(norms: impl Iterator<Item = f64>) -> f64 {
+    norms.map(|norm| norm * norm).sum::<f64>().sqrt()
+}
+
+/// Left singular vectors times singular values, class by class, keeping at most the `keep` largest overall:
+/// whole multiplets that are not lost in rounding.
 fn decompose(folded: &[Matrix<f64>], keep: usize) -> LightPrior {
     let parts: Vec<_> = folded.iter().map(|m| svd(m.view())).collect();
     let mut singular_values: Vec<f64> = parts
@@ -123,12 +125,13 @@ fn decompose(folded: &[Matrix<f64>], keep: usize) -> LightPrior {
         .flat_map(|part| part.singular_values.iter().copied())
         .collect();
     singular_values.sort_by(|a, b| b.total_cmp(a));
-    let largest = singular_values.first().copied().unwrap_or(0.0);
-    let threshold = match singular_values.get(keep.saturating_sub(1)) {
-        Some(&smallest_kept) => smallest_kept,
-        None => 0.0,
-    }
-    .max(1e-12 * largest);
+    let kept = whole_multiplets(&singular_values, keep);
+    // Between the last one kept and the first one left out, where rounding cannot reach.
+    let next = singular_values.get(kept).copied().unwrap_or(0.0);
+    let threshold = match kept.checked_sub(1) {
+        Some(last) => 0.5 * (singular_values[last] + next),
+        None => f64::INFINITY,
+    };
     let classes = parts
         .iter()
         .map(|part| {

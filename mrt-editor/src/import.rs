@@ -189,7 +189,11 @@ fn tidy(path: &Path, raw: RawMesh, config: &ImportConfig) -> Result<ImportedScen
         triangles: raw.triangles,
         normals: None,
         triangle_materials: raw.triangle_materials,
-        materials: raw.paints.iter().map(|paint| paint.material(config)).collect(),
+        materials: raw
+            .paints
+            .iter()
+            .map(|paint| paint.material(config))
+            .collect(),
     };
     let turn = match config.up {
         UpAxis::Y => DAffine3::IDENTITY,
@@ -225,8 +229,16 @@ fn tidy(path: &Path, raw: RawMesh, config: &ImportConfig) -> Result<ImportedScen
         scale: config.scale,
         size_m: (high - low).to_array(),
         materials: used(|_| true),
-        clamped_albedos: if is_overridden { 0 } else { used(Paint::is_clamped) },
-        made_up_albedos: if is_overridden { 0 } else { used(|paint| paint.colour.is_none()) },
+        clamped_albedos: if is_overridden {
+            0
+        } else {
+            used(Paint::is_clamped)
+        },
+        made_up_albedos: if is_overridden {
+            0
+        } else {
+            used(|paint| paint.colour.is_none())
+        },
         ..ImportReport::from(tidied)
     };
     Ok(ImportedScene { mesh, report })
@@ -276,7 +288,8 @@ impl Paint {
     }
 
     fn is_clamped(&self) -> bool {
-        self.colour.is_some_and(|colour| colour != clamp_albedo(colour))
+        self.colour
+            .is_some_and(|colour| colour != clamp_albedo(colour))
     }
 
     fn material(&self, config: &ImportConfig) -> Material {
@@ -364,13 +377,28 @@ mod tests {
     #[test]
     fn hostile_files_are_refused_by_kind() {
         let kind = |name: &str, bytes: &[u8]| read_text(name, bytes).expect_err("refused");
-        assert!(matches!(kind("a.obj", b""), ImportError::Empty { found: 0, .. }));
-        assert!(matches!(kind("a.obj", b"\xff\xfe\0"), ImportError::Malformed { .. }));
+        assert!(matches!(
+            kind("a.obj", b""),
+            ImportError::Empty { found: 0, .. }
+        ));
+        assert!(matches!(
+            kind("a.obj", b"\xff\xfe\0"),
+            ImportError::Malformed { .. }
+        ));
         assert!(matches!(kind("a.glb", b""), ImportError::Malformed { .. }));
-        assert!(matches!(kind("a.glb", b"glTF\x02\0\0\0\0\0\0\0"), ImportError::Malformed { .. }));
-        assert!(matches!(kind("a.ply", b"ply"), ImportError::UnknownFormat { .. }));
+        assert!(matches!(
+            kind("a.glb", b"glTF\x02\0\0\0\0\0\0\0"),
+            ImportError::Malformed { .. }
+        ));
+        assert!(matches!(
+            kind("a.ply", b"ply"),
+            ImportError::UnknownFormat { .. }
+        ));
         let huge = b"v 0 0 0\nv 1e30 0 0\nv 0 1e30 0\nf 1 2 3\n";
-        assert!(matches!(kind("a.obj", huge), ImportError::OutOfRange { .. }));
+        assert!(matches!(
+            kind("a.obj", huge),
+            ImportError::OutOfRange { .. }
+        ));
         let missing = read_scene(Path::new("/nowhere/a.obj"), &CONFIG);
         assert!(matches!(missing, Err(ImportError::Io { .. })));
     }

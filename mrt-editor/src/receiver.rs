@@ -5,8 +5,13 @@
 //! one block. Joined blocks take the wall that the surface is turned like instead: two blocks side
 //! by side then choose the same wall, and light runs on across their common side.
 
+mod cube_camera;
+pub mod unwrap;
+
+use cube_camera::CubeCamera;
 use glam::{DVec3, Vec3};
-use mrt_core::cube::Face;
+use mrt_core::bvh::Bvh;
+use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
 use mrt_runtime::level::{Block, Level};
 
@@ -30,10 +35,15 @@ const STEPS_OFF_SURFACE: [f64; 3] = [0.01, 0.06, 0.25];
 /// Weight of nearness against likeness of direction when a wall is chosen.
 const NEARNESS_WEIGHT: f64 = 0.35;
 
+/// The cube camera decides for surfaces turned like the face that sees them, to this cosine; the sides
+/// of furniture are seen through the floor but turned like walls.
+const LEAST_FACING: f64 = 0.35;
+
 /// Blocks by place.
 #[derive(Clone, Debug)]
 pub struct ReceiverMap {
     blocks: Vec<Placed>,
+    camera: Option<CubeCamera>,
     lookup: Lookup,
     smallest_diagonal: f64,
 }
@@ -41,6 +51,7 @@ pub struct ReceiverMap {
 #[derive(Clone, Debug)]
 struct Placed {
     warp: Hexahedron,
+    orientation: CubeRotation,
     bounds: (DVec3, DVec3),
     walls: Vec<Face>,
 }
@@ -53,6 +64,7 @@ impl ReceiverMap {
             .iter()
             .map(|block| Placed {
                 warp: block.warp,
+                orientation: block.orientation,
                 bounds: block.warp.bounds(),
                 walls: walls(block),
             })
@@ -64,8 +76,20 @@ impl ReceiverMap {
         Self {
             lookup: Lookup::new(&blocks),
             blocks,
+            camera: None,
             smallest_diagonal,
         }
+    }
+
+    /// As [`ReceiverMap::new`]; a level of one closed block looks at the mesh with a cube camera.
+    pub fn with_mesh(level: &Level, bvh: &Bvh) -> Self {
+        let mut map = Self::new(level);
+        if let [block] = level.blocks.as_slice()
+            && block.shape.openings.is_empty()
+        {
+            map.camera = Some(CubeCamera::new(&block.warp, bvh));
+        }
+        map
     }
 
     /// The receiver of a surface point with a unit normal out of the surface, `None` only without
@@ -74,23 +98,37 @@ impl ReceiverMap {
         let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
         let (block, unit) = self.block_in_front(point, normal)?;
         let placed = &self.blocks[block];
-        let score = |face: Face| {
-            let axis = face.axis();
-            let depth = if face.is_positive() { 1.0 - unit[axis] } else { unit[axis] };
-            let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
-            normal.dot(placed.warp.face_normal(face, u, v)) - NEARNESS_WEIGHT * depth
-        };
-        let face = placed
-            .walls
-            .iter()
-            .copied()
-            .max_by(|&a, &b| score(a).total_cmp(&score(b)))?;
+        let seen = self
+            .camera
+            .as_ref()
+            .and_then(|camera| camera.face_that_sees(&placed.warp, point, unit))
+            .filter(|&face| placed.facing(face, unit, normal) > LEAST_FACING);
+        let face = seen.or_else(|| placed.wall_towards(unit, normal))?;
         Some(Receiver {
             block,
             face,
             u: unit[face.u_axis()],
             v: unit[face.v_axis()],
         })
+    }
+
+    /// Where a point lies on a given wall of a given block, moved inside it.
+    pub fn receiver_on(&self, point: Vec3, block: usize, face: Face) -> Receiver {
+        let unit = self.blocks[block].unit(point.as_dvec3());
+        Receiver {
+            block,
+            face,
+            u: unit[face.u_axis()],
+            v: unit[face.v_axis()],
+        }
+    }
+
+    /// The receiver in the block's canonical shape: face, u, v.
+    pub fn canonical(&self, receiver: &Receiver) -> (Face, f64, f64) {
+        let canonical = self.blocks[receiver.block].orientation.inverse();
+        let face = canonical.face(receiver.face);
+        let point = canonical.point(receiver.face.point(receiver.u, receiver.v));
+        (face, point[face.u_axis()], point[face.v_axis()])
     }
 
     /// The block that contains a point, or else the nearest, and the distance to it in metres.
@@ -103,7 +141,8 @@ impl ReceiverMap {
     fn block_in_front(&self, point: DVec3, normal: DVec3) -> Option<(usize, DVec3)> {
         let mut nearest: Option<(usize, f64)> = None;
         for step in STEPS_OFF_SURFACE {
-            let (block, _, distance) = self.nearest(point + normal * step * self.smallest_diagonal)?;
+            let (block, _, distance) =
+                self.nearest(point + normal * step * self.smallest_diagonal)?;
             if nearest.is_none_or(|(_, least)| distance < least) {
                 nearest = Some((block, distance));
             }
@@ -140,6 +179,29 @@ impl ReceiverMap {
 }
 
 impl Placed {
+    /// The wall that a surface is turned like; of several the nearest.
+    fn wall_towards(&self, unit: DVec3, normal: DVec3) -> Option<Face> {
+        let score = |face: Face| {
+            let axis = face.axis();
+            let depth = if face.is_positive() {
+                1.0 - unit[axis]
+            } else {
+                unit[axis]
+            };
+            self.facing(face, unit, normal) - NEARNESS_WEIGHT * depth
+        };
+        self.walls
+            .iter()
+            .copied()
+            .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+    }
+
+    /// Cosine between a surface's normal and a wall's.
+    fn facing(&self, face: Face, unit: DVec3, normal: DVec3) -> f64 {
+        let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
+        normal.dot(self.warp.face_normal(face, u, v))
+    }
+
     /// The point's place in the unit cube, moved inside it.
     fn unit(&self, point: DVec3) -> DVec3 {
         // The inverse of a warp is unsure far outside; there the nearest point of the bounds will do.
@@ -175,8 +237,14 @@ const LOOKUP_CELLS: usize = 24;
 
 impl Lookup {
     fn new(blocks: &[Placed]) -> Self {
-        let min = blocks.iter().map(|b| b.bounds.0).fold(DVec3::MAX, DVec3::min);
-        let max = blocks.iter().map(|b| b.bounds.1).fold(DVec3::MIN, DVec3::max);
+        let min = blocks
+            .iter()
+            .map(|b| b.bounds.0)
+            .fold(DVec3::MAX, DVec3::min);
+        let max = blocks
+            .iter()
+            .map(|b| b.bounds.1)
+            .fold(DVec3::MIN, DVec3::max);
         // Meshes reach beyond the blocks; further out, the outermost cells serve.
         let margin = (max - min) * 0.1;
         let (min, max) = (min - margin, max + margin);

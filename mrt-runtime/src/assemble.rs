@@ -189,7 +189,8 @@ fn crossing(level: &Level, here: Opening, there: Opening) -> Result<Beyond, Asse
             .rectangle([0.0, 1.0], [0.0, 1.0])
             .into_iter()
             .min_by(|a, b| {
-                let distance = |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
+                let distance =
+                    |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
                 distance(a).total_cmp(&distance(b))
             })
             .unwrap_or(unit_there)
@@ -220,7 +221,8 @@ fn crossing(level: &Level, here: Opening, there: Opening) -> Result<Beyond, Asse
         _ => None,
     };
     let up = image_of(1);
-    let proper = rotation.filter(|r| up == Some(Face::PosY) && Some(r.face(Face::PosZ)) == image_of(2));
+    let proper =
+        rotation.filter(|r| up == Some(Face::PosY) && Some(r.face(Face::PosZ)) == image_of(2));
     match proper {
         Some(here_from_there) => Ok(Beyond::Block {
             block: there.block,
@@ -302,6 +304,5 @@ pub(crate) fn entering_frame(opening: Face) -> CubeRotation {
 /// Row of a texel among the five walls of the cube open at -z.
 fn receiver_texel(face: Face, center: DVec3, resolution: usize) -> usize {
     let wall = face.index() - usize::from(face > Face::NegZ);
-    let along = |axis: usize| (center[axis] * resolution as f64) as usize;
-    (wall * resolution + along(face.v_axis())) * resolution + along(face.u_axis())
+    wall * resolution * resolution + face.texel_index(center, resolution)
 }

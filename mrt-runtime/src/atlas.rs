@@ -5,7 +5,7 @@
 //! creases inside a block it repeats the wall's own edge.
 
 use crate::scene::{Beyond, SceneBlock};
-use glam::{DVec3, Vec2};
+use glam::Vec2;
 use mrt_core::cube::Face;
 
 /// Where each texel of a scene goes in the lightmap.
@@ -59,13 +59,7 @@ impl AtlasLayout {
         layout
     }
 
-    fn record_tile(
-        &mut self,
-        blocks: &[SceneBlock],
-        block: usize,
-        face: Face,
-        origin: [usize; 2],
-    ) {
+    fn record_tile(&mut self, blocks: &[SceneBlock], block: usize, face: Face, origin: [usize; 2]) {
         let tile = self.resolution + 2;
         for row in 0..tile {
             for column in 0..tile {
@@ -169,7 +163,7 @@ fn texel_seen(
             let beyond = there_from_here.point(center + step - side.outward());
             let wall = there_from_here.face(face);
             if let Some(offset) = blocks[there].shape.wall_offset(wall, resolution) {
-                return Some((there, offset + texel_index(wall, beyond, resolution)));
+                return Some((there, offset + wall.texel_index(beyond, resolution)));
             }
         }
     }
@@ -178,12 +172,4 @@ fn texel_seen(
         block,
         offset + inside[1] as usize * resolution + inside[0] as usize,
     ))
-}
-
-fn texel_index(face: Face, center: DVec3, resolution: usize) -> usize {
-    let along = |axis: usize| {
-        let k = (center[axis] * resolution as f64).floor();
-        k.clamp(0.0, resolution as f64 - 1.0) as usize
-    };
-    along(face.v_axis()) * resolution + along(face.u_axis())
 }

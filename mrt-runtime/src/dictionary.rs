@@ -8,6 +8,8 @@ use mrt_core::matrix::Matrix;
 pub struct Dictionary {
     /// Name of the preset that it was baked with.
     pub preset: String,
+    /// Settings of the bake, as text for people.
+    pub settings: String,
     /// Texels along an edge of a wall.
     pub resolution: usize,
     /// One entry a shape; no shape twice.
@@ -70,26 +72,31 @@ impl Dictionary {
             &interface.response_from_lightfield,
             &interface.response_basis,
         ];
-        let of_shapes = self.shapes.iter().flat_map(|entry| {
-            [
-                &entry.coefficients_from_direct,
-                &entry.indirect_basis,
-                &entry.implicit_lighting,
-            ]
-            .into_iter()
-            .chain(&entry.lightfield_from_coefficients)
-        });
-        shared
-            .into_iter()
-            .chain(of_shapes)
-            .map(|matrix| std::mem::size_of_val(matrix.data()))
-            .sum()
+        let shared: usize = shared.into_iter().map(matrix_bytes).sum();
+        shared + self.shapes.iter().map(ShapeOperators::bytes).sum::<usize>()
     }
+}
+
+fn matrix_bytes(matrix: &Matrix<f32>) -> usize {
+    std::mem::size_of_val(matrix.data())
 }
 
 impl ShapeOperators {
     /// Number of modes `k_b`.
     pub fn modes(&self) -> usize {
         self.indirect_basis.columns()
+    }
+
+    /// Bytes of this shape's matrices.
+    pub fn bytes(&self) -> usize {
+        [
+            &self.coefficients_from_direct,
+            &self.indirect_basis,
+            &self.implicit_lighting,
+        ]
+        .into_iter()
+        .chain(&self.lightfield_from_coefficients)
+        .map(matrix_bytes)
+        .sum()
     }
 }

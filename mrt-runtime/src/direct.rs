@@ -36,8 +36,8 @@ pub(crate) fn direct_light<V: Visibility>(
     }
 }
 
-/// Irradiance from one light at one point.
-fn irradiance<V: Visibility>(
+/// Irradiance, W/m² per channel, from one light at one point of a surface with unit `normal`.
+pub fn irradiance<V: Visibility>(
     scene: &Scene,
     placed: &PlacedLight,
     receiver: Receiver,

@@ -44,6 +44,18 @@ pub struct StageTimes {
     pub atlas: Duration,
 }
 
+impl StageTimes {
+    /// Sum over the stages.
+    pub fn total(&self) -> Duration {
+        self.direct
+            + self.coefficients
+            + self.responses
+            + self.own_indirect
+            + self.foreign_indirect
+            + self.atlas
+    }
+}
+
 /// The buffers of a frame, made once for a scene; frames allocate nothing.
 ///
 /// Signals on texels are stored block by block, in a block channel by channel (red, green, blue), and in a
@@ -216,6 +228,13 @@ impl Frame {
     /// Indirect irradiance, W/m², not multiplied by the receiving texel's albedo.
     pub fn indirect(&self) -> &[f32] {
         &self.indirect
+    }
+
+    /// Indirect irradiance, RGB, of one texel of a block; the scene must be the one that was solved.
+    pub fn indirect_at(&self, scene: &Scene, block: usize, texel: usize) -> [f32; 3] {
+        let range = &scene.blocks[block].texels;
+        let start = 3 * range.start + texel;
+        std::array::from_fn(|channel| self.indirect[start + channel * range.len()])
     }
 
     /// Coefficients b: block by block, channel by channel.

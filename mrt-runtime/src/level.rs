@@ -305,14 +305,11 @@ impl Level {
         let mut uses = vec![[0usize; 6]; self.blocks.len()];
         for (connection, ends) in self.connections.iter().enumerate() {
             for end in [ends.a, ends.b] {
-                let block = self
-                    .blocks
-                    .get(end.block)
-                    .ok_or(LevelError::NoSuchBlock {
-                        connection,
-                        expected: self.blocks.len(),
-                        found: end.block,
-                    })?;
+                let block = self.blocks.get(end.block).ok_or(LevelError::NoSuchBlock {
+                    connection,
+                    expected: self.blocks.len(),
+                    found: end.block,
+                })?;
                 if !block.is_open(end.face) {
                     return Err(LevelError::NotAnOpening {
                         connection,

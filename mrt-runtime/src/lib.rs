@@ -6,16 +6,17 @@
 //! which a game keeps. Every frame takes [`light`]s through [`direct`] light and the reduced operators
 //! to indirect irradiance ([`frame`]) and copies it to a lightmap [`atlas`].
 
-pub mod shape;
-pub mod level;
-pub mod level_text;
-mod overlap;
-pub mod dictionary;
-pub mod scene;
 pub mod assemble;
-mod propagate;
-pub mod light;
-pub mod visibility;
+pub mod atlas;
+pub mod dictionary;
+pub mod dictionary_file;
 pub mod direct;
 pub mod frame;
-pub mod atlas;
+pub mod level;
+pub mod level_text;
+pub mod light;
+mod overlap;
+mod propagate;
+pub mod scene;
+pub mod shape;
+pub mod visibility;

@@ -75,7 +75,9 @@ pub enum LightError {
         found: Vec3,
     },
     /// In a wall, or outside the level.
-    #[error("light {light}: position {found} m lies in no block; expected a point inside the level")]
+    #[error(
+        "light {light}: position {found} m lies in no block; expected a point inside the level"
+    )]
     OutsideBlocks {
         /// Which light.
         light: usize,
@@ -84,28 +86,19 @@ pub enum LightError {
     },
 }
 
-/// A light whose values have been checked, and the block that it stands in.
+/// A light whose values have been checked, and the block that it stands in. Made by [`place`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PlacedLight {
-    pub light: Light,
+pub struct PlacedLight {
+    pub(crate) light: Light,
     /// `None` for directional lights.
-    pub block: Option<usize>,
+    pub(crate) block: Option<usize>,
 }
 
-impl Default for PlacedLight {
-    fn default() -> Self {
-        Self {
-            light: Light::Directional {
-                direction: Vec3::NEG_Y,
-                irradiance: Vec3::ZERO,
-            },
-            block: None,
-        }
-    }
-}
-
-/// Checks one light and finds its block.
-pub(crate) fn place(scene: &Scene, index: usize, light: Light) -> Result<PlacedLight, LightError> {
+/// Checks one light, number `index` of the caller's, and finds its block.
+///
+/// # Errors
+/// [`LightError`].
+pub fn place(scene: &Scene, index: usize, light: Light) -> Result<PlacedLight, LightError> {
     let check = |what, value: f32, low, high| {
         if (low..=high).contains(&value) {
             Ok(())

@@ -17,7 +17,8 @@ pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     for &b in &order {
         active.retain(|&a| bounds[a].1.x > bounds[b].0.x);
         for &a in &active {
-            let apart = bounds[a].1.cmple(bounds[b].0).any() || bounds[b].1.cmple(bounds[a].0).any();
+            let apart =
+                bounds[a].1.cmple(bounds[b].0).any() || bounds[b].1.cmple(bounds[a].0).any();
             if apart {
                 continue;
             }

@@ -113,6 +113,27 @@ impl Scene {
         containing(0.0).or_else(|| containing(tolerance))
     }
 
+    /// Index within a block of the texel at (row, column) of a face *as the level names it*, after
+    /// orientation; `None` for openings and texels that do not exist.
+    pub fn level_texel(
+        &self,
+        block: usize,
+        face: Face,
+        row: usize,
+        column: usize,
+    ) -> Option<usize> {
+        let resolution = self.resolution;
+        let placed = self.blocks.get(block)?;
+        if row >= resolution || column >= resolution {
+            return None;
+        }
+        let canonical = placed.orientation.inverse();
+        let center = canonical.point(face.texel_center(resolution, row, column));
+        let face = canonical.face(face);
+        let offset = placed.shape.wall_offset(face, resolution)?;
+        Some(offset + face.texel_index(center, resolution))
+    }
+
     /// Bytes of the operators that frames read.
     pub fn operator_bytes(&self) -> usize {
         let of_shapes: usize = self

@@ -80,12 +80,12 @@ pub enum ReferenceError {
         source: std::io::Error,
     },
     /// The description is no JSON of the expected form.
-    #[error("{file}: not a reference description ({source})")]
+    #[error("{file}: not a reference description: {found}; expected JSON with its keys")]
     Json {
         /// Which file.
         file: String,
-        /// Where and what.
-        source: serde_json::Error,
+        /// What the parser met and where, shortened: it quotes the file, which may be long.
+        found: String,
     },
     /// A value contradicts the format or another value.
     #[error("{file}: {what} is {found}; expected {expected}")]
@@ -150,9 +150,10 @@ impl ReferenceFile {
     /// spread: every bounce has the same mean, and the deviations from it shrink by a factor that
     /// settles. So bounce K + n is taken as mean + ρⁿ (bounce K - mean), with one ρ for the level,
     /// the measured ratio of the last two deviations' norms. (A ratio for each texel would amplify
-    /// its noise, and exceeds 1 where light still arrives.) The continued part is at most a^K of
-    /// the whole, 2 % at albedo 0.5 but half at 0.9, where long levels leave it a few per cent
-    /// wrong far from the light; [`Bounces::Count`] up to K has no such part.
+    /// its noise, and exceeds 1 where light still arrives.) The continued part is about a^K of the
+    /// whole. From six bounces, measured on exact terms, it leaves at most 0.06 % of error at albedo
+    /// 0.5; at 0.9 below 0.12 % in compact rooms, 2 % in corridors and 5 % in the maze, most of it
+    /// far from the light. [`Bounces::Count`] up to K has no such part.
     ///
     /// # Errors
     /// [`ReferenceError::NotInFile`] for coloured or probe files, lights that do not exist, more

@@ -76,7 +76,7 @@ pub enum ContainerError {
         /// Its name.
         name: String,
     },
-    /// A section given to the writer, or asked of the reader, breaks a rule: a bug in the caller.
+    /// A section given to the writer breaks a rule: a bug in the caller.
     #[error("section \"{name}\": {reason}")]
     InvalidSection {
         /// Its name.

@@ -89,8 +89,7 @@ impl<'a> Container<'a> {
     /// A section of text.
     ///
     /// # Errors
-    /// [`ContainerError::MissingSection`], [`ContainerError::InvalidSection`] if it is not text, and
-    /// [`ContainerError::Malformed`] if it is not UTF-8.
+    /// [`ContainerError::MissingSection`], and [`ContainerError::Malformed`] if it is not text or not UTF-8.
     pub fn text(&self, name: &str) -> Result<&'a str, ContainerError> {
         let section = self.typed_section(name, ElementType::Text)?;
         std::str::from_utf8(section.content).map_err(|error| {
@@ -103,7 +102,7 @@ impl<'a> Container<'a> {
     /// matters, or take [`Container::finite_numbers`].
     ///
     /// # Errors
-    /// [`ContainerError::MissingSection`], [`ContainerError::InvalidSection`] if it has another type, and
+    /// [`ContainerError::MissingSection`], [`ContainerError::Malformed`] if it has another type, and
     /// [`ContainerError::LimitExceeded`] if `budget` has fewer bytes left than it takes.
     pub fn numbers<T: Element>(
         &self,
@@ -154,13 +153,17 @@ impl<'a> Container<'a> {
         wanted: ElementType,
     ) -> Result<&Section<'a>, ContainerError> {
         let section = self.section(name)?;
-        if section.element_type == wanted {
+        let found = section.element_type;
+        if found == wanted {
             return Ok(section);
         }
-        Err(ContainerError::InvalidSection {
-            name: name.to_owned(),
-            reason: "its elements have another type",
-        })
+        let (expected, found) = (format!("{wanted:?}"), format!("{found:?}"));
+        Err(malformed(
+            "element type of a section",
+            section.offset,
+            expected,
+            found,
+        ))
     }
 }
 

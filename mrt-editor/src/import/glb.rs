@@ -73,7 +73,12 @@ fn parse_document(json: &[u8]) -> Result<gltf::Document, String> {
         for material in list_mut(root.get_mut("materials")) {
             remove(
                 material,
-                &["normalTexture", "occlusionTexture", "emissiveTexture", "extensions"],
+                &[
+                    "normalTexture",
+                    "occlusionTexture",
+                    "emissiveTexture",
+                    "extensions",
+                ],
             );
             if let Some(pbr) = material.get_mut("pbrMetallicRoughness") {
                 remove(pbr, &["baseColorTexture", "metallicRoughnessTexture"]);
@@ -83,8 +88,8 @@ fn parse_document(json: &[u8]) -> Result<gltf::Document, String> {
             remove(node, &["skin"]);
         }
     }
-    let root: gltf::json::Root = gltf::json::deserialize::from_value(json)
-        .map_err(|error| format!("document: {error}"))?;
+    let root: gltf::json::Root =
+        gltf::json::deserialize::from_value(json).map_err(|error| format!("document: {error}"))?;
     gltf::Document::from_json(root).map_err(|error| format!("document: {error}"))
 }
 
@@ -120,7 +125,10 @@ impl Reader<'_> {
         self.node_visits += 1;
         if depth > MAX_NODE_DEPTH || self.node_visits > MAX_NODE_VISITS {
             let place = format!("node {}", node.index());
-            return Err((place, "nodes nested at most 256 deep, without cycles, and at most 1,000,000"));
+            return Err((
+                place,
+                "nodes nested at most 256 deep, without cycles, and at most 1,000,000",
+            ));
         }
         let world_from_node = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
         for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
@@ -153,14 +161,22 @@ impl Reader<'_> {
                 f32::from_le_bytes([element[k], element[k + 1], element[k + 2], element[k + 3]])
             };
             let position = Vec3::new(number(0), number(4), number(8));
-            self.mesh.positions.push(world_from_node.transform_point3(position));
+            self.mesh
+                .positions
+                .push(world_from_node.transform_point3(position));
         }
         let indices: Vec<u32> = match primitive.indices() {
             None => (0..vertex_count as u32).collect(),
             Some(accessor) => read_indices(self.bin, &accessor)?,
         };
-        if let Some(bad) = indices.iter().find(|&&index| index as usize >= vertex_count) {
-            return Err((format!("index {bad}"), "indices below the number of vertices"));
+        if let Some(bad) = indices
+            .iter()
+            .find(|&&index| index as usize >= vertex_count)
+        {
+            return Err((
+                format!("index {bad}"),
+                "indices below the number of vertices",
+            ));
         }
         if self.mesh.triangles.len() + indices.len() / 3 > MAX_TRIANGLES {
             return Err(("nodes".to_owned(), "at most 50,000,000 triangles"));
@@ -218,7 +234,9 @@ fn elements<'a>(
         let end = view.offset().checked_add(view.length())?;
         let view_bytes = bin.get(view.offset()..end)?;
         let bytes = view_bytes.get(accessor.offset()..)?;
-        let needed = stride.checked_mul(count.checked_sub(1)?)?.checked_add(size)?;
+        let needed = stride
+            .checked_mul(count.checked_sub(1)?)?
+            .checked_add(size)?;
         (stride >= size).then(|| bytes.get(..needed)).flatten()
     };
     let bytes = range().ok_or_else(|| fault("its data inside the file"))?;

@@ -58,7 +58,8 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
             "usemtl" => {
                 let name = rest.trim();
                 material = *material_index.entry(name.to_owned()).or_insert_with(|| {
-                    mesh.paints.push(Paint::new(name, colours.get(name).copied()));
+                    mesh.paints
+                        .push(Paint::new(name, colours.get(name).copied()));
                     mesh.paints.len() as u32 - 1
                 });
             }

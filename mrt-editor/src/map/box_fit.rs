@@ -24,7 +24,11 @@ pub fn fit_box(shape: &'static Shape, points: &[Vec3]) -> Level {
         let outliers = (OUTLIER_SHARE * last as f64) as usize;
         let (low, high) = (at(outliers), at(last - outliers));
         let is_whole = at(last) - at(0) <= WHOLE_STRETCH * (high - low);
-        (min[axis], max[axis]) = if is_whole { (at(0), at(last)) } else { (low, high) };
+        (min[axis], max[axis]) = if is_whole {
+            (at(0), at(last))
+        } else {
+            (low, high)
+        };
     }
     // A flat scene still needs a block with a volume.
     let least = 1e-2 * (max - min).max_element().max(1e-3);

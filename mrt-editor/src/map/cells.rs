@@ -70,7 +70,11 @@ impl Cell {
     /// Mean height of the side across `axis` (0: x, 1: z) at the larger or smaller coordinate.
     fn side_height(&self, axis: usize, positive: bool) -> f64 {
         let corners = side_corners(axis, positive);
-        corners.map(|k| self.ceiling[k] - self.floor[k]).iter().sum::<f64>() / 2.0
+        corners
+            .map(|k| self.ceiling[k] - self.floor[k])
+            .iter()
+            .sum::<f64>()
+            / 2.0
     }
 }
 
@@ -95,7 +99,10 @@ pub fn cut_into_cells(space: &FreeSpace, columns: &Columns, lines: &GridLines) -
             for storey in storeys(columns, &xs, &zs) {
                 let cell = cells.len();
                 if let Some(found) = gather(columns, [&xs, &zs], &storey, &mut cell_of_run, cell) {
-                    cells.push(Cell { column: [i, k], ..found });
+                    cells.push(Cell {
+                        column: [i, k],
+                        ..found
+                    });
                 }
             }
         }
@@ -254,7 +261,9 @@ fn passages(
             .collect();
         candidates.sort_by(|p, q| {
             let open = |p: &Passage| p.openness * p.area;
-            open(q).total_cmp(&open(p)).then((p.low, p.high).cmp(&(q.low, q.high)))
+            open(q)
+                .total_cmp(&open(p))
+                .then((p.low, p.high).cmp(&(q.low, q.high)))
         });
         let mut taken = vec![[false; 2]; cells.len()];
         for passage in candidates {

@@ -88,13 +88,14 @@ impl Columns {
 fn run_of(space: &FreeSpace, column: [usize; 2], rows: Range<usize>) -> Run {
     let grid = &space.grid;
     let at = |y: usize| grid.index([column[0], y, column[1]]);
-    let (bottom, top) = (
-        grid.boundary(1, rows.start),
-        grid.boundary(1, rows.end),
-    );
+    let (bottom, top) = (grid.boundary(1, rows.start), grid.boundary(1, rows.end));
     let floor = f64::from(space.floor[at(rows.start)]).max(bottom - grid.edge);
     let ceiling = f64::from(space.ceiling[at(rows.end - 1)]);
-    let ceiling = if ceiling > top + grid.edge { top } else { ceiling };
+    let ceiling = if ceiling > top + grid.edge {
+        top
+    } else {
+        ceiling
+    };
     Run {
         column,
         rows,

@@ -37,13 +37,19 @@ pub fn join_cells(
     cells: &Cells,
     config: &JoinConfig,
 ) -> Result<GridLevel, LevelError> {
-    let coordinates: [Vec<f64>; 2] =
-        std::array::from_fn(|axis| lines.lines[axis].iter().map(|&line| snap(space, axis, line)).collect());
+    let coordinates: [Vec<f64>; 2] = std::array::from_fn(|axis| {
+        lines.lines[axis]
+            .iter()
+            .map(|&line| snap(space, axis, line))
+            .collect()
+    });
     let mut is_kept = vec![true; cells.cells.len()];
     let crumbs = drop_crumbs(cells, config, &mut is_kept);
     let mut misfits = 0;
     loop {
-        let kept: Vec<usize> = (0..cells.cells.len()).filter(|&cell| is_kept[cell]).collect();
+        let kept: Vec<usize> = (0..cells.cells.len())
+            .filter(|&cell| is_kept[cell])
+            .collect();
         let open: Vec<Passage> = cells
             .passages
             .iter()
@@ -103,7 +109,11 @@ fn snap(space: &FreeSpace, axis: usize, line: usize) -> f64 {
 /// Forgets the cells of groups that are too small; returns how many.
 fn drop_crumbs(cells: &Cells, config: &JoinConfig, is_kept: &mut [bool]) -> usize {
     let mut groups = Groups::new(cells.cells.len());
-    for passage in cells.passages.iter().filter(|p| p.openness >= config.openness) {
+    for passage in cells
+        .passages
+        .iter()
+        .filter(|p| p.openness >= config.openness)
+    {
         groups.unite(passage.low, passage.high);
     }
     let mut volume = vec![0; cells.cells.len()];

@@ -182,7 +182,10 @@ fn disagreements(cells: &Cells, lines: &GridLines, axis: usize) -> Vec<f64> {
 /// 1 for cells of the same floor and ceiling, 0 when they differ by half their height.
 fn likeness(a: &Cell, b: &Cell) -> f64 {
     let mean = |heights: &[f64; 4]| heights.iter().sum::<f64>() / 4.0;
-    let (floor, ceiling) = (mean(&a.floor) - mean(&b.floor), mean(&a.ceiling) - mean(&b.ceiling));
+    let (floor, ceiling) = (
+        mean(&a.floor) - mean(&b.floor),
+        mean(&a.ceiling) - mean(&b.ceiling),
+    );
     let height = (mean(&a.ceiling) - mean(&a.floor)).min(mean(&b.ceiling) - mean(&b.floor));
     (1.0 - (floor.abs() + ceiling.abs()) / height.max(1e-9)).max(0.0)
 }

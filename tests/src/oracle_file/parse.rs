@@ -57,13 +57,17 @@ pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
     file.limit("the file size in bytes", size, MAX_JSON_BYTES)?;
     let text = std::fs::read(description).map_err(io)?;
     let parsed: Description =
-        serde_json::from_slice(&text).map_err(|source| ReferenceError::Json {
+        serde_json::from_slice(&text).map_err(|error| ReferenceError::Json {
             file: file.0.clone(),
-            source,
+            found: shortened(error.to_string()),
         })?;
     let stem = description.file_stem().unwrap_or_default();
     if stem != parsed.name.as_str() {
-        return Err(file.malformed("name", format!("{stem:?}, as the file is named"), parsed.name));
+        return Err(file.malformed(
+            "name",
+            format!("{stem:?}, as the file is named"),
+            Shown(parsed.name),
+        ));
     }
     let walls = check_level(&file, &parsed)?;
     let (kind, expected_shape) = check_kind(&file, &parsed, &walls)?;
@@ -229,11 +233,7 @@ fn check_kind(
     }
 }
 
-fn read_values(
-    path: &Path,
-    count: u64,
-    may_be_negative: bool,
-) -> Result<Vec<f32>, ReferenceError> {
+fn read_values(path: &Path, count: u64, may_be_negative: bool) -> Result<Vec<f32>, ReferenceError> {
     let file = At(path.display().to_string());
     let io = |source| ReferenceError::Io {
         file: file.0.clone(),

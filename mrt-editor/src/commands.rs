@@ -1,0 +1,8 @@
+//! One module a command: its flags and what it does.
+
+pub mod accuracy;
+pub mod bake;
+pub mod demo;
+pub mod info;
+pub mod light;
+pub mod map;

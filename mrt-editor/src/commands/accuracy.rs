@@ -1,0 +1,369 @@
+//! `mrt accuracy`: error of the reduced solution against reference files.
+
+use crate::dictionary_source::{SourceError, load};
+use crate::table::Table;
+use glam::Vec3;
+use mrt_core::cube::Face;
+use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::frame::{Bounces, Frame, FrameError};
+use mrt_runtime::level::{CellsError, Level};
+use mrt_runtime::light::Light;
+use mrt_runtime::scene::Scene;
+use mrt_runtime::visibility::Openings;
+use mrt_tests::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
+use mrt_tests::oracle_file::{Kind, RGB_BOUNCES, ReferenceError, ReferenceFile, read};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Compares solved levels with reference solutions, light by light.
+#[derive(Clone, Debug, clap::Args)]
+pub struct AccuracyArgs {
+    /// Reference descriptions, each with its numbers beside it in a file of the same name ending in .f32.
+    #[arg(required = true, value_name = "REF.json")]
+    pub references: Vec<PathBuf>,
+    /// Dictionary preset: mobile, standard or quality; all but standard are baked first.
+    #[arg(long)]
+    pub preset: Option<String>,
+    /// Dictionary file, instead of a preset.
+    #[arg(long, conflicts_with = "preset")]
+    pub dictionary: Option<PathBuf>,
+    /// Which bounces to compare.
+    #[arg(long, value_enum, default_value = "first")]
+    pub bounces: BouncesArg,
+    /// Albedo of all walls, for references without their own [default: 1 for the first bounce, 0.5 for
+    /// all].
+    #[arg(long)]
+    pub albedo: Option<f64>,
+    /// Openings that light may cross, at most.
+    #[arg(long, default_value_t = AssembleConfig::default().max_depth)]
+    pub max_depth: usize,
+    /// Print one JSON object a line: scene, light, term, preset, rel_l2, rel_l2_by_hop.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Which bounces a comparison covers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BouncesArg {
+    /// The first.
+    First,
+    /// All together.
+    All,
+}
+
+/// Why a comparison failed.
+#[derive(Debug, thiserror::Error)]
+pub enum AccuracyError {
+    /// No dictionary.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The reference is at fault.
+    #[error(transparent)]
+    Reference(#[from] ReferenceError),
+    /// The reference's cells are not a level of the dictionary's shapes.
+    #[error("{scene}: {source}")]
+    Cells {
+        /// Name of the reference.
+        scene: String,
+        /// Why.
+        source: CellsError,
+    },
+    /// The level cannot be assembled.
+    #[error("{scene}: {source}")]
+    Assemble {
+        /// Name of the reference.
+        scene: String,
+        /// Why.
+        source: AssembleError,
+    },
+    /// A light is refused.
+    #[error("{scene}: {source}")]
+    Frame {
+        /// Name of the reference.
+        scene: String,
+        /// Why.
+        source: FrameError,
+    },
+    /// Texels of dictionary and reference differ.
+    #[error(
+        "{scene}: the reference has {found}² texels a wall; expected the dictionary's {expected}²"
+    )]
+    Resolution {
+        /// Name of the reference.
+        scene: String,
+        /// The dictionary's.
+        expected: usize,
+        /// The reference's.
+        found: usize,
+    },
+    /// Probe references.
+    #[error(
+        "{scene}: references of kind radiance_sh9 (probes) are not supported; expected irradiance"
+    )]
+    Probes {
+        /// Name of the reference.
+        scene: String,
+    },
+    /// An albedo for which bounces do not die out.
+    #[error("albedo {found}; expected {expected}")]
+    Albedo {
+        /// The range.
+        expected: &'static str,
+        /// The value given.
+        found: f64,
+    },
+    /// Some references could not be compared; the others were.
+    #[error("{failed} of {count} references could not be compared (see above)")]
+    Some {
+        /// How many.
+        failed: usize,
+        /// Of how many.
+        count: usize,
+    },
+    /// A line has no form as JSON.
+    #[error("the report cannot be printed: {0}")]
+    Report(#[from] serde_json::Error),
+}
+
+/// Error of one light's indirect irradiance.
+#[derive(Clone, Debug, Serialize)]
+pub struct LightAccuracy {
+    /// Name of the reference.
+    pub scene: String,
+    /// Index of the light.
+    pub light: usize,
+    /// "first_bounce" or "all_bounces".
+    pub term: &'static str,
+    /// Preset of the dictionary.
+    pub preset: String,
+    /// Relative L2 error over the whole level, as a fraction.
+    pub rel_l2: f64,
+    /// The same over blocks 0, 1, 2 and 3 or more openings away; none where there are none.
+    pub rel_l2_by_hop: [Option<f64>; HOP_GROUPS],
+}
+
+/// Compares all references and prints; one that fails is reported and the others still run.
+///
+/// # Errors
+/// [`AccuracyError`].
+pub fn run(args: &AccuracyArgs) -> Result<(), AccuracyError> {
+    check_albedo(args)?;
+    let dictionary = load(args.dictionary.as_deref(), args.preset.as_deref())?;
+    let mut all = Vec::new();
+    let mut failed = 0;
+    for path in &args.references {
+        let result = read(path)
+            .map_err(AccuracyError::from)
+            .and_then(|reference| compare(&reference, &dictionary, args));
+        match result {
+            Err(error) => {
+                eprintln!("mrt: {error}");
+                failed += 1;
+            }
+            Ok(lights) => {
+                if args.json {
+                    for light in &lights {
+                        println!("{}", serde_json::to_string(light)?);
+                    }
+                }
+                all.extend(lights);
+            }
+        }
+    }
+    if !args.json && !all.is_empty() {
+        print(&all);
+    }
+    match failed {
+        0 => Ok(()),
+        failed => Err(AccuracyError::Some {
+            failed,
+            count: args.references.len(),
+        }),
+    }
+}
+
+fn check_albedo(args: &AccuracyArgs) -> Result<(), AccuracyError> {
+    let (legal, expected) = match (args.bounces, args.albedo) {
+        (_, None) => (true, ""),
+        (BouncesArg::First, Some(albedo)) => (albedo > 0.0 && albedo <= 1.0, "above 0, at most 1"),
+        (BouncesArg::All, Some(albedo)) => (albedo > 0.0 && albedo < 1.0, "above 0 and below 1"),
+    };
+    match args.albedo {
+        Some(found) if !legal => Err(AccuracyError::Albedo { expected, found }),
+        _ => Ok(()),
+    }
+}
+
+/// Solves a reference's level for each of its lights and compares.
+///
+/// # Errors
+/// [`AccuracyError`], if the reference's level or its kind is not supported.
+pub fn compare(
+    reference: &ReferenceFile,
+    dictionary: &Dictionary,
+    args: &AccuracyArgs,
+) -> Result<Vec<LightAccuracy>, AccuracyError> {
+    let scene_name = || reference.name.clone();
+    let Some(resolution) = reference.resolution else {
+        return Err(AccuracyError::Probes {
+            scene: scene_name(),
+        });
+    };
+    if resolution != dictionary.resolution {
+        return Err(AccuracyError::Resolution {
+            scene: scene_name(),
+            expected: dictionary.resolution,
+            found: resolution,
+        });
+    }
+    let albedo = args.albedo.unwrap_or(match args.bounces {
+        BouncesArg::First => 1.0,
+        BouncesArg::All => 0.5,
+    });
+    let level = level(reference, albedo)?;
+    let config = AssembleConfig {
+        max_depth: args.max_depth,
+    };
+    let scene =
+        assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
+            scene: scene_name(),
+            source,
+        })?;
+    let mut frame = Frame::new(&scene);
+    (0..reference.lights.len())
+        .map(|light| {
+            let source = Light::Sphere {
+                position: reference.lights[light].as_vec3(),
+                radius: 0.0,
+                intensity: Vec3::splat(reference.intensity as f32),
+            };
+            frame
+                .solve(&scene, &[source], &Openings, frame_bounces(reference, args))
+                .map_err(|source| AccuracyError::Frame {
+                    scene: scene_name(),
+                    source,
+                })?;
+            let (ours, theirs) = signals(reference, &scene, &frame, light, albedo, args)?;
+            Ok(LightAccuracy {
+                scene: scene_name(),
+                light,
+                term: match args.bounces {
+                    BouncesArg::First => "first_bounce",
+                    BouncesArg::All => "all_bounces",
+                },
+                preset: dictionary.preset.clone(),
+                rel_l2: rel_l2(&ours, &theirs),
+                rel_l2_by_hop: rel_l2_by_hop(&ours, &theirs, &reference.hops(light)?),
+            })
+        })
+        .collect()
+}
+
+/// The reference's level with its own wall colours, or `albedo` everywhere.
+fn level(reference: &ReferenceFile, albedo: f64) -> Result<Level, AccuracyError> {
+    let uniform = Vec3::splat(albedo as f32);
+    let mut level =
+        Level::from_cells(&reference.cells, uniform).map_err(|source| AccuracyError::Cells {
+            scene: reference.name.clone(),
+            source,
+        })?;
+    if let Kind::IrradianceRgb { albedo } = &reference.kind {
+        for (&(cell, face), colour) in reference.walls.iter().zip(albedo) {
+            level.blocks[cell].albedo[face.index()] = Vec3::from_array(colour.map(|c| c as f32));
+        }
+    }
+    Ok(level)
+}
+
+fn frame_bounces(reference: &ReferenceFile, args: &AccuracyArgs) -> Bounces {
+    match (args.bounces, &reference.kind) {
+        (BouncesArg::First, _) => Bounces::Count(1),
+        // Coloured references stop after a stated number of bounces.
+        (BouncesArg::All, Kind::IrradianceRgb { .. }) => Bounces::Count(RGB_BOUNCES as u32),
+        (BouncesArg::All, _) => Bounces::Converged {
+            tolerance: 1e-6,
+            limit: 2000,
+        },
+    }
+}
+
+/// Our and the reference's indirect irradiance, in the reference's order of texels and channels.
+fn signals(
+    reference: &ReferenceFile,
+    scene: &Scene,
+    frame: &Frame,
+    light: usize,
+    albedo: f64,
+    args: &AccuracyArgs,
+) -> Result<(Vec<f64>, Vec<f64>), AccuracyError> {
+    let bounces = match args.bounces {
+        BouncesArg::First => mrt_tests::Bounces::First,
+        BouncesArg::All => mrt_tests::Bounces::All,
+    };
+    let (theirs, channels) = match reference.kind {
+        Kind::IrradianceRgb { .. } => {
+            let rgb = reference.indirect_irradiance_rgb(light, bounces)?;
+            (rgb.as_flattened().to_vec(), 3)
+        }
+        _ => (reference.indirect_irradiance(light, bounces, albedo)?, 1),
+    };
+    let mut ours = Vec::with_capacity(theirs.len());
+    for (block, face) in reference.walls.iter().copied() {
+        push_wall(scene, frame, (block, face), channels, &mut ours);
+    }
+    Ok((ours, theirs))
+}
+
+/// Appends a wall's texels, row by row, `channels` values each.
+fn push_wall(
+    scene: &Scene,
+    frame: &Frame,
+    (block, face): (usize, Face),
+    channels: usize,
+    out: &mut Vec<f64>,
+) {
+    for row in 0..scene.resolution {
+        for column in 0..scene.resolution {
+            // Walls of the reference are walls of the level: both follow from the cells.
+            let texel = scene.level_texel(block, face, row, column);
+            for channel in 0..channels {
+                let value = texel.map_or(0.0, |t| frame.indirect_at(scene, block, t)[channel]);
+                out.push(f64::from(value));
+            }
+        }
+    }
+}
+
+fn print(all: &[LightAccuracy]) {
+    println!("relative L2 error of indirect irradiance, %, by openings from the light's block");
+    let mut table = Table::new(&["scene", "light", "whole", "0", "1", "2", "3+"]);
+    let percent = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", 100.0 * x));
+    for light in all {
+        let mut cells = vec![
+            light.scene.clone(),
+            light.light.to_string(),
+            percent(Some(light.rel_l2)),
+        ];
+        cells.extend(light.rel_l2_by_hop.map(percent));
+        table.row(cells);
+    }
+    let mean = |values: Vec<f64>| {
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let mut cells = vec![
+        "mean over lights".to_owned(),
+        all.len().to_string(),
+        percent(mean(all.iter().map(|light| light.rel_l2).collect())),
+    ];
+    cells.extend((0..HOP_GROUPS).map(|hop| {
+        percent(mean(
+            all.iter()
+                .filter_map(|light| light.rel_l2_by_hop[hop])
+                .collect(),
+        ))
+    }));
+    table.row(cells);
+    print!("{table}");
+    println!("preset {}, {}", all[0].preset, all[0].term);
+}

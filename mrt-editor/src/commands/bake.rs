@@ -1,0 +1,209 @@
+//! `mrt bake`: computes a dictionary.
+
+use crate::dictionary_source::{DEFAULT_PRESET, bake_with_progress};
+use crate::table::Table;
+use mrt_core::container::{ContainerError, write_file_atomically};
+use mrt_dictionary::config::{BakeConfig, ConfigError};
+use mrt_dictionary::progress::Cancelled;
+use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::dictionary_file::DictionaryError;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Bakes a dictionary of canonical shapes; the same settings give the same bytes.
+#[derive(Clone, Debug, clap::Args)]
+pub struct BakeArgs {
+    /// Which shapes.
+    #[arg(long, value_enum, default_value = "cubes-2d")]
+    pub set: ShapeSet,
+    /// Quality and size: mobile, standard or quality.
+    #[arg(long, default_value = DEFAULT_PRESET)]
+    pub preset: String,
+    /// Dictionary file to write.
+    #[arg(long)]
+    pub out: PathBuf,
+    /// Texels along an edge of a wall [default: the preset's].
+    #[arg(long)]
+    pub resolution: Option<usize>,
+    /// Modes of indirect light in a block, at most [default: the preset's].
+    #[arg(long)]
+    pub modes: Option<usize>,
+    /// Modes of light through an opening, at most [default: the preset's].
+    #[arg(long)]
+    pub lightfield_modes: Option<usize>,
+    /// Modes of the walls' response to light through an opening, at most [default: the preset's].
+    #[arg(long)]
+    pub response_modes: Option<usize>,
+    /// Lights of the prior along each axis [default: the preset's].
+    #[arg(long)]
+    pub lights_per_axis: Option<usize>,
+    /// Weight of the enrichment that keeps coloured walls and many bounces right; 0 leaves it out.
+    #[arg(long)]
+    pub enrichment: Option<f64>,
+    /// Print the report as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Families of shapes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ShapeSet {
+    /// Cubes with 0 to 4 of their side faces missing: six shapes, twelve openings.
+    #[value(name = "cubes-2d")]
+    Cubes2d,
+}
+
+/// Why nothing was baked.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// The user stopped it.
+    #[error("{0}; no file was written")]
+    Cancelled(#[from] Cancelled),
+    /// The dictionary has no form as bytes.
+    #[error(transparent)]
+    Dictionary(#[from] DictionaryError),
+    /// The file cannot be written.
+    #[error(transparent)]
+    File(#[from] ContainerError),
+    /// The report has no form as JSON.
+    #[error("the report cannot be printed: {0}")]
+    Report(#[from] serde_json::Error),
+}
+
+#[derive(Serialize)]
+struct BakeReport {
+    file: String,
+    preset: String,
+    settings: String,
+    seconds: f64,
+    file_bytes: usize,
+    lightfield_modes: usize,
+    lightfield_dropped_energy: f32,
+    response_modes: usize,
+    response_dropped_energy: f32,
+    shapes: Vec<ShapeReport>,
+}
+
+#[derive(Serialize)]
+struct ShapeReport {
+    shape: &'static str,
+    texels: usize,
+    modes: usize,
+    dropped_energy: f32,
+    bytes: usize,
+}
+
+/// Bakes, writes the file and reports.
+///
+/// # Errors
+/// [`BakeError`]; the file is then as it was.
+pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
+    let config = config(args)?;
+    let start = Instant::now();
+    let dictionary = bake_with_progress(&config)?;
+    let bytes = dictionary.to_bytes()?;
+    write_file_atomically(&args.out, &bytes)?;
+    let report = report(
+        args,
+        &dictionary,
+        bytes.len(),
+        start.elapsed().as_secs_f64(),
+    );
+    if args.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        print(&report);
+    }
+    Ok(())
+}
+
+fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
+    let mut config = BakeConfig::preset(&args.preset)?;
+    let overrides = [
+        (args.resolution, &mut config.resolution),
+        (args.modes, &mut config.modes),
+        (
+            args.lightfield_modes,
+            &mut config.lightfield.lightfield_modes,
+        ),
+        (args.response_modes, &mut config.lightfield.response_modes),
+        (args.lights_per_axis, &mut config.prior.lights_per_axis),
+    ];
+    let mut changed = args.enrichment.is_some();
+    for (given, setting) in overrides {
+        if let Some(value) = given {
+            *setting = value;
+            changed = true;
+        }
+    }
+    match args.enrichment {
+        Some(weight) if weight == 0.0 => config.enrichment = None,
+        Some(weight) => {
+            if let Some(enrichment) = &mut config.enrichment {
+                enrichment.constant_weight = weight;
+                enrichment.indirect_weight = weight;
+            }
+        }
+        None => {}
+    }
+    if changed {
+        config.preset = format!("{} (changed)", args.preset);
+    }
+    config.check()?;
+    Ok(config)
+}
+
+fn report(args: &BakeArgs, dictionary: &Dictionary, file_bytes: usize, seconds: f64) -> BakeReport {
+    BakeReport {
+        file: args.out.display().to_string(),
+        preset: dictionary.preset.clone(),
+        settings: dictionary.settings.clone(),
+        seconds,
+        file_bytes,
+        lightfield_modes: dictionary.interface.straight.rows(),
+        lightfield_dropped_energy: dictionary.interface.lightfield_dropped_energy,
+        response_modes: dictionary.interface.response_basis.columns(),
+        response_dropped_energy: dictionary.interface.response_dropped_energy,
+        shapes: dictionary
+            .shapes
+            .iter()
+            .map(|entry| ShapeReport {
+                shape: entry.shape.name,
+                texels: entry.indirect_basis.rows(),
+                modes: entry.modes(),
+                dropped_energy: entry.dropped_energy,
+                bytes: entry.bytes(),
+            })
+            .collect(),
+    }
+}
+
+fn print(report: &BakeReport) {
+    println!("{}: {}", report.preset, report.settings);
+    let mut table = Table::new(&["shape", "texels", "modes", "energy dropped", "bytes"]);
+    for shape in &report.shapes {
+        table.row([
+            shape.shape.to_owned(),
+            shape.texels.to_string(),
+            shape.modes.to_string(),
+            format!("{:.2e}", shape.dropped_energy),
+            shape.bytes.to_string(),
+        ]);
+    }
+    print!("{table}");
+    println!(
+        "openings: {} lightfield modes (energy dropped {:.2e}), {} response modes ({:.2e})",
+        report.lightfield_modes,
+        report.lightfield_dropped_energy,
+        report.response_modes,
+        report.response_dropped_energy
+    );
+    println!(
+        "{}: {} bytes in {:.1} s",
+        report.file, report.file_bytes, report.seconds
+    );
+}

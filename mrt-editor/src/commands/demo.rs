@@ -1,0 +1,371 @@
+//! `mrt demo`: lights a built-in maze, takes pictures and measures time and error.
+
+use crate::dictionary_source::{SourceError, load};
+use crate::level_view::{LevelView, ViewError};
+use crate::picture::camera::Camera;
+use crate::picture::file::{WriteError, write_png};
+use crate::picture::render;
+use crate::picture::tone::{auto_exposure, tone_map};
+use crate::reference_level::{LevelErrors, ReferenceLevelError, measure};
+use crate::table::Table;
+use glam::Vec3;
+use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::frame::{Bounces, Frame, FrameError, StageTimes};
+use mrt_runtime::level::Level;
+use mrt_runtime::level_text::{LevelTextError, from_text};
+use mrt_runtime::light::Light;
+use mrt_runtime::scene::Scene;
+use mrt_runtime::visibility::Openings;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// The built-in maze: thirteen blocks with a loop and coloured walls.
+pub const MAZE: &str = include_str!("../../../assets/maze.level.toml");
+
+/// Frames over which stage times are taken; the fastest counts, since other programs only slow them.
+const TIMED_FRAMES: usize = 20;
+
+/// Bounces in pictures and in the second row of errors.
+const BOUNCES: u32 = 8;
+
+/// Lights a built-in maze and shows what the method does: pictures, times and errors.
+#[derive(Clone, Debug, clap::Args)]
+pub struct DemoArgs {
+    /// Folder for the pictures.
+    #[arg(long, default_value = "mrt-demo")]
+    pub out: PathBuf,
+    /// Level to show instead of the built-in maze.
+    #[arg(long)]
+    pub level: Option<PathBuf>,
+    /// Dictionary file instead of the built-in one.
+    #[arg(long)]
+    pub dictionary: Option<PathBuf>,
+    /// Leave out the comparison with the exact solution.
+    #[arg(long)]
+    pub no_exact: bool,
+    /// Print the report as one JSON object.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Default for DemoArgs {
+    fn default() -> Self {
+        Self {
+            out: PathBuf::from("mrt-demo"),
+            level: None,
+            dictionary: None,
+            no_exact: false,
+            json: false,
+        }
+    }
+}
+
+/// Why the demo stopped.
+#[derive(Debug, thiserror::Error)]
+pub enum DemoError {
+    /// No dictionary.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// The level file cannot be read.
+    #[error("{file}: {source}")]
+    LevelFile {
+        /// Which file.
+        file: String,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The level is at fault.
+    #[error(transparent)]
+    Level(#[from] LevelTextError),
+    /// Level and dictionary do not fit.
+    #[error(transparent)]
+    Assemble(#[from] AssembleError),
+    /// A light is refused.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// Nothing can be seen.
+    #[error(transparent)]
+    View(#[from] ViewError),
+    /// The exact solution failed.
+    #[error(transparent)]
+    Exact(#[from] ReferenceLevelError),
+    /// A picture cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The report has no form as JSON.
+    #[error("the report cannot be printed: {0}")]
+    Report(#[from] serde_json::Error),
+}
+
+#[derive(Serialize)]
+struct DemoReport {
+    blocks: usize,
+    connections: usize,
+    texels: usize,
+    preset: String,
+    modes: Vec<(&'static str, usize)>,
+    operator_bytes: usize,
+    dictionary_bytes: usize,
+    assemble_ms: f64,
+    stages_ms: Vec<(&'static str, f64)>,
+    frame_ms: f64,
+    errors: Option<LevelErrors>,
+    pictures: Vec<String>,
+}
+
+/// Runs the demo.
+///
+/// # Errors
+/// [`DemoError`].
+pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
+    let dictionary = load(args.dictionary.as_deref(), None)?;
+    let level = read_level(args)?;
+    let start = Instant::now();
+    let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
+    let assemble_ms = milliseconds(start.elapsed());
+    let lights = maze_lights(&scene);
+    let mut frame = Frame::new(&scene);
+    let times = time_frames(&mut frame, &scene, &lights)?;
+    let errors = if args.no_exact {
+        None
+    } else {
+        eprintln!("solving the same level exactly, to compare");
+        Some(measure(&level, &scene, &mut frame, &lights, BOUNCES)?)
+    };
+    frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
+    let pictures = take_pictures(args, &level, &scene, &frame, &lights)?;
+    let report = report(
+        &level,
+        &scene,
+        &dictionary,
+        assemble_ms,
+        times,
+        errors,
+        pictures,
+    );
+    if args.json {
+        println!("{}", serde_json::to_string(&report)?);
+    } else {
+        print(&report);
+    }
+    Ok(())
+}
+
+fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
+    let Some(path) = &args.level else {
+        return Ok(from_text(MAZE)?);
+    };
+    let text = std::fs::read_to_string(path).map_err(|source| DemoError::LevelFile {
+        file: path.display().to_string(),
+        source,
+    })?;
+    Ok(from_text(&text)?)
+}
+
+/// A warm light in the first block and a cool one in a block far from it.
+fn maze_lights(scene: &Scene) -> Vec<Light> {
+    let center = |block: usize| scene.blocks[block].warp.center().as_vec3();
+    let size = scene.blocks[0].warp.diagonal() as f32 / 3f32.sqrt();
+    let first = center(0);
+    let far = (0..scene.blocks.len()).map(center).fold(first, |far, c| {
+        if c.distance(first) > far.distance(first) {
+            c
+        } else {
+            far
+        }
+    });
+    let sphere = |position: Vec3, intensity: Vec3| Light::Sphere {
+        position,
+        radius: 0.1 * size,
+        intensity: intensity * size * size,
+    };
+    let warm = sphere(
+        first + Vec3::new(0.1, 0.2, 0.0) * size,
+        Vec3::new(1.0, 0.82, 0.6),
+    );
+    let cool = sphere(
+        far + Vec3::new(0.0, 0.25, 0.0) * size,
+        Vec3::new(0.55, 0.75, 1.0),
+    );
+    if far == first {
+        vec![warm]
+    } else {
+        vec![warm, cool]
+    }
+}
+
+/// The fastest of several frames of one bounce.
+fn time_frames(
+    frame: &mut Frame,
+    scene: &Scene,
+    lights: &[Light],
+) -> Result<StageTimes, FrameError> {
+    let mut best: Option<StageTimes> = None;
+    for _ in 0..TIMED_FRAMES {
+        frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
+        let times = frame.times();
+        if best.is_none_or(|best| times.total() < best.total()) {
+            best = Some(times);
+        }
+    }
+    Ok(best.unwrap_or_default())
+}
+
+/// Direct, indirect and both: from above with the ceilings off, and from inside the first block.
+fn take_pictures(
+    args: &DemoArgs,
+    level: &Level,
+    scene: &Scene,
+    frame: &Frame,
+    lights: &[Light],
+) -> Result<Vec<String>, DemoError> {
+    std::fs::create_dir_all(&args.out).map_err(|source| WriteError::Io {
+        path: args.out.clone(),
+        source,
+    })?;
+    let (min, max) = level
+        .blocks
+        .iter()
+        .map(|b| b.warp.bounds())
+        .fold((glam::DVec3::MAX, glam::DVec3::MIN), |(lo, hi), (a, b)| {
+            (lo.min(a), hi.max(b))
+        });
+    let (min, max) = (min.as_vec3(), max.as_vec3());
+    let (middle, extent) = (0.5 * (min + max), (max - min).max_element());
+    let first = &scene.blocks[0].warp;
+    let size = first.diagonal() as f32 / 3f32.sqrt();
+    let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
+    let from_above = middle + Vec3::new(0.0, 1.15 * extent, 0.75 * extent);
+    let eye = scene.blocks[0]
+        .warp
+        .point(glam::DVec3::new(0.06, 0.5, 0.5))
+        .as_vec3();
+    let ahead = scene.blocks[0]
+        .warp
+        .point(glam::DVec3::new(3.0, 0.42, 0.5))
+        .as_vec3();
+    let views = [
+        view(
+            "above",
+            from_above,
+            middle - Vec3::Y * 0.1 * size,
+            0.75,
+            false,
+        ),
+        view("inside", eye, ahead, 1.25, true),
+    ];
+    let mut written = Vec::new();
+    for (name, from, to, angle, with_ceilings) in views {
+        let shown = LevelView::new(scene, frame, lights, with_ceilings)?;
+        let [width, height] = [960, 640];
+        let Some(camera) = Camera::look_at(from, to, angle, width as f32 / height as f32) else {
+            continue;
+        };
+        let pictures = render(&camera, [width, height], 2, |origin, direction| {
+            let (direct, indirect) = shown.radiance(origin, direction);
+            [direct, indirect, direct + indirect]
+        });
+        // One exposure for the three, so that they can be compared.
+        let exposure = auto_exposure(&[&pictures[2]]);
+        for (picture, part) in pictures.iter().zip(["direct", "indirect", "both"]) {
+            let path = args.out.join(format!("{name}-{part}.png"));
+            write_png(&path, [width, height], &tone_map(picture, exposure))?;
+            written.push(path.display().to_string());
+        }
+    }
+    Ok(written)
+}
+
+fn milliseconds(duration: std::time::Duration) -> f64 {
+    duration.as_secs_f64() * 1e3
+}
+
+fn report(
+    level: &Level,
+    scene: &Scene,
+    dictionary: &Dictionary,
+    assemble_ms: f64,
+    times: StageTimes,
+    errors: Option<LevelErrors>,
+    pictures: Vec<String>,
+) -> DemoReport {
+    let used = |shape| scene.blocks.iter().any(|block| block.shape == shape);
+    DemoReport {
+        blocks: level.blocks.len(),
+        connections: level.connections.len(),
+        texels: scene.texel_count(),
+        preset: dictionary.preset.clone(),
+        modes: dictionary
+            .shapes
+            .iter()
+            .filter(|entry| used(entry.shape))
+            .map(|entry| (entry.shape.name, entry.modes()))
+            .collect(),
+        operator_bytes: scene.operator_bytes(),
+        dictionary_bytes: dictionary.bytes(),
+        assemble_ms,
+        stages_ms: vec![
+            ("direct light", milliseconds(times.direct)),
+            ("b = T_d->b l", milliseconds(times.coefficients)),
+            ("r = T_b->r b", milliseconds(times.responses)),
+            ("U_b b", milliseconds(times.own_indirect)),
+            ("U_r r", milliseconds(times.foreign_indirect)),
+            ("lightmap atlas", milliseconds(times.atlas)),
+        ],
+        frame_ms: milliseconds(times.total()),
+        errors,
+        pictures,
+    }
+}
+
+fn print(report: &DemoReport) {
+    let modes: Vec<String> = report
+        .modes
+        .iter()
+        .map(|(shape, modes)| format!("{shape} {modes}"))
+        .collect();
+    println!(
+        "maze: {} blocks, {} openings between them, {} texels; preset {}",
+        report.blocks, report.connections, report.texels, report.preset
+    );
+    println!("modes by shape: {}", modes.join(", "));
+    println!(
+        "operators: {} KiB used by this level, {} KiB in the dictionary\n",
+        report.operator_bytes / 1024,
+        report.dictionary_bytes / 1024
+    );
+    let mut table = Table::new(&["stage of a frame (one core, one bounce)", "ms"]);
+    for (stage, ms) in &report.stages_ms {
+        table.row([(*stage).to_owned(), format!("{ms:.3}")]);
+    }
+    table.row(["whole frame".to_owned(), format!("{:.3}", report.frame_ms)]);
+    table.row([
+        "assembling the level (once)".to_owned(),
+        format!("{:.3}", report.assemble_ms),
+    ]);
+    println!("{table}");
+    if let Some(errors) = &report.errors {
+        let percent = |x: f64| format!("{:.2} %", 100.0 * x);
+        let mut table = Table::new(&["error against the exact solution", "relative L2"]);
+        table.row([
+            "indirect light, first bounce".to_owned(),
+            percent(errors.first_bounce),
+        ]);
+        table.row([
+            format!("indirect light, {BOUNCES} bounces"),
+            percent(errors.many_bounces),
+        ]);
+        table.row([
+            format!("direct and indirect, {BOUNCES} bounces"),
+            percent(errors.total),
+        ]);
+        println!("{table}");
+        println!("the exact solution took {:.1} s\n", errors.exact_seconds);
+    }
+    println!("pictures:");
+    for picture in &report.pictures {
+        println!("  {picture}");
+    }
+}

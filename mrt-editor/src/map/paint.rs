@@ -1,0 +1,74 @@
+//! Gives every wall of a level the mean albedo of the surfaces that receive their light from it.
+
+use super::surface::SurfacePoint;
+use crate::receiver::ReceiverMap;
+use glam::{DVec3, Vec3};
+use mrt_core::cube::Face;
+use mrt_core::mesh::TriangleMesh;
+use mrt_runtime::level::Level;
+use serde::Serialize;
+
+/// A point is near a block within this share of the block's diagonal: walls of real rooms have niches,
+/// and blocks are coarse.
+const NEAR: f64 = 0.1;
+
+/// Shares of the mesh's area.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Inside a block.
+    pub inside: f64,
+    /// Inside or near one.
+    pub near: f64,
+}
+
+/// Paints the walls and measures how much of the mesh the level holds.
+pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoint]) -> Coverage {
+    let receivers = ReceiverMap::new(level);
+    let diagonals: Vec<f64> = level.blocks.iter().map(|b| b.warp.diagonal()).collect();
+    let mut walls = vec![[(DVec3::ZERO, 0.0); 6]; level.blocks.len()];
+    let (mut inside, mut near, mut total) = (0.0, 0.0, 0.0);
+    for point in points {
+        total += point.area;
+        let Some((block, distance)) = receivers.nearest_block(point.position) else {
+            continue;
+        };
+        // Rounding puts a wall's own surface a hair outside.
+        let is_inside = distance <= 1e-3 * diagonals[block];
+        let is_near = distance <= NEAR * diagonals[block];
+        inside += if is_inside { point.area } else { 0.0 };
+        near += if is_near { point.area } else { 0.0 };
+        if !is_near {
+            continue;
+        }
+        if let Some(receiver) = receivers.receiver(point.position, point.normal) {
+            let material = mesh.triangle_materials[point.triangle] as usize;
+            let albedo = mesh.materials[material].albedo.as_dvec3();
+            let (sum, area) = &mut walls[receiver.block][receiver.face.index()];
+            *sum += albedo * point.area;
+            *area += point.area;
+        }
+    }
+    let whole = mean(walls.iter().flatten());
+    for (block, walls) in level.blocks.iter_mut().zip(&walls) {
+        let of_block = mean(walls.iter()).or(whole).unwrap_or(Vec3::splat(0.5));
+        for face in Face::ALL {
+            block.albedo[face.index()] = if block.is_open(face) {
+                of_block
+            } else {
+                mean([&walls[face.index()]].into_iter()).unwrap_or(of_block)
+            };
+        }
+    }
+    Coverage {
+        inside: inside / total,
+        near: near / total,
+    }
+}
+
+/// The mean over areas, `None` without any; kept in [0, 1] against rounding.
+fn mean<'a>(sums: impl Iterator<Item = &'a (DVec3, f64)>) -> Option<Vec3> {
+    let (sum, area) = sums.fold((DVec3::ZERO, 0.0), |(sum, area), (s, a)| {
+        (sum + s, area + a)
+    });
+    (area > 0.0).then(|| (sum / area).as_vec3().clamp(Vec3::ZERO, Vec3::ONE))
+}

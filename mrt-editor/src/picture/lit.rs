@@ -1,0 +1,139 @@
+//! Colours of a mesh under sphere lights, with indirect light from a lightmap.
+
+use crate::receiver::ReceiverMap;
+use glam::Vec3;
+use mrt_core::bvh::Bvh;
+use mrt_core::mesh::TriangleMesh;
+use mrt_core::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
+use mrt_runtime::atlas::AtlasLayout;
+use std::f32::consts::PI;
+
+/// Shadow rays a light and view ray.
+const SHADOW_RAYS: u32 = 4;
+
+/// A sphere light; irradiance is `intensity cos θ / max(d², radius²)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereLight {
+    /// Centre, metres.
+    pub position: Vec3,
+    /// Metres.
+    pub radius: f32,
+    /// Radiant intensity per colour channel, W/sr.
+    pub intensity: Vec3,
+}
+
+/// Everything a ray needs to find its colour.
+#[derive(Clone, Copy)]
+pub struct LitScene<'a> {
+    /// The mesh.
+    pub mesh: &'a TriangleMesh,
+    /// Unit normals of the triangles' corners, for shading.
+    pub corner_normals: &'a [[Vec3; 3]],
+    /// The mesh's tree.
+    pub bvh: &'a Bvh,
+    /// From points of the mesh to walls of blocks.
+    pub receivers: &'a ReceiverMap,
+    /// From walls of blocks to the lightmap.
+    pub atlas: &'a AtlasLayout,
+    /// Indirect irradiance, W/m².
+    pub lightmap: &'a [[f32; 3]],
+    /// Lights, for the direct part.
+    pub lights: &'a [SphereLight],
+    /// Surfaces are invisible from behind, so that a view from outside looks into the rooms.
+    pub hides_backs: bool,
+}
+
+/// What a ray sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Colours {
+    /// Radiance by direct light.
+    pub direct: Vec3,
+    /// Radiance by indirect light.
+    pub indirect: Vec3,
+}
+
+struct Surface {
+    position: Vec3,
+    /// Of the triangle, towards the viewer.
+    flat_normal: Vec3,
+    /// Smoothed, towards the viewer.
+    normal: Vec3,
+    albedo: Vec3,
+}
+
+impl LitScene<'_> {
+    /// The radiance that comes back along a ray with a unit direction; none where it hits nothing.
+    pub fn colours(&self, origin: Vec3, direction: Vec3) -> Colours {
+        let Some(surface) = self.surface(origin, direction) else {
+            return Colours::default();
+        };
+        let reflectance = surface.albedo / PI;
+        Colours {
+            direct: reflectance * self.direct(&surface),
+            indirect: reflectance * self.indirect(&surface),
+        }
+    }
+
+    fn surface(&self, mut origin: Vec3, direction: Vec3) -> Option<Surface> {
+        // Few surfaces lie behind one another; the bound is against rays along a stack of them.
+        for _ in 0..64 {
+            let hit = self.bvh.closest_hit(origin, direction, f32::INFINITY)?;
+            let triangle = hit.triangle as usize;
+            let [a, b, c] = self.mesh.corners(triangle);
+            let flat = (b - a).cross(c - a).normalize_or_zero();
+            let position = origin + direction * hit.t;
+            let is_back = flat.dot(direction) > 0.0;
+            if is_back && self.hides_backs {
+                origin = position + direction * (1e-4 * hit.t.max(1e-2));
+                continue;
+            }
+            let towards_viewer = if is_back { -1.0 } else { 1.0 };
+            let [na, nb, nc] = self.corner_normals[triangle];
+            let smooth = na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v;
+            let material = self.mesh.triangle_materials[triangle] as usize;
+            return Some(Surface {
+                position,
+                flat_normal: flat * towards_viewer,
+                normal: smooth.try_normalize().unwrap_or(flat) * towards_viewer,
+                albedo: self.mesh.materials[material].albedo,
+            });
+        }
+        None
+    }
+
+    /// Irradiance straight from the lights, with soft shadows.
+    fn direct(&self, surface: &Surface) -> Vec3 {
+        let seed = hash(surface.position.x.to_bits(), surface.position.z.to_bits());
+        let mut sum = Vec3::ZERO;
+        for light in self.lights {
+            let offset = light.position - surface.position;
+            let squared = offset.length_squared().max(light.radius * light.radius);
+            let cosine = surface.normal.dot(offset.normalize_or_zero());
+            if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
+                continue;
+            }
+            let start = surface.position + surface.flat_normal * (1e-4 * offset.length());
+            let mut visible = 0;
+            for k in 0..SHADOW_RAYS {
+                let square = square_from_unit(sobol_point(k, seed));
+                let on_light = sphere_from_square(square).as_vec3() * light.radius;
+                let towards = light.position + on_light - start;
+                visible += u32::from(!self.bvh.is_occluded(start, towards, 1.0));
+            }
+            let share = visible as f32 / SHADOW_RAYS as f32;
+            sum += light.intensity * (cosine / squared * share);
+        }
+        sum
+    }
+
+    /// Irradiance from the lightmap.
+    fn indirect(&self, surface: &Surface) -> Vec3 {
+        let lookup = || {
+            let receiver = self.receivers.receiver(surface.position, surface.normal)?;
+            let (face, u, v) = self.receivers.canonical(&receiver);
+            let pixel = self.atlas.pixel(receiver.block, face, u as f32, v as f32)?;
+            Some(Vec3::from_array(self.atlas.sample(self.lightmap, pixel)))
+        };
+        lookup().unwrap_or(Vec3::ZERO)
+    }
+}
