@@ -31,8 +31,15 @@ pub struct PriorConfig {
 }
 
 /// Weights of what joins the prior, relative to the prior's own Frobenius norm.
+///
+/// The defaults were tuned on the reference files. Weights of 0.1 leave coloured walls 10 % wrong where 0.2
+/// leaves 6, and 1 costs 0.1 to 0.4 % on white ones. Uniform light joins with a weight so large that the
+/// bases hold it exactly: without it a white furnace is 13 % too dark in its corners, and all bounces at
+/// albedo 0.9 err by 2.9 % instead of 2.1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enrichment {
+    /// Of uniform light.
+    pub uniform_weight: f64,
     /// Of the functions that are constant on one wall.
     pub constant_weight: f64,
     /// Of the indirect basis.
@@ -122,10 +129,9 @@ impl BakeConfig {
         let lightfield = &self.lightfield;
         let max_modes = MAX_MODES as f64;
         let max_resolution = MAX_RESOLUTION as f64;
-        let weights = self
-            .enrichment
-            .as_ref()
-            .map_or([0.0; 2], |e| [e.constant_weight, e.indirect_weight]);
+        let weights = self.enrichment.as_ref().map_or([0.0; 3], |e| {
+            [e.uniform_weight, e.constant_weight, e.indirect_weight]
+        });
         let ranges = [
             ("resolution", self.resolution as f64, 1.0, max_resolution),
             ("number of modes", self.modes as f64, 1.0, max_modes),
@@ -137,8 +143,9 @@ impl BakeConfig {
             ),
             ("light radius", self.prior.light_radius, 0.0, 1.0),
             ("k_d", self.prior.k_d as f64, 1.0, f64::INFINITY),
-            ("constant weight", weights[0], 0.0, 100.0),
-            ("indirect weight", weights[1], 0.0, 100.0),
+            ("uniform weight", weights[0], 0.0, 1000.0),
+            ("constant weight", weights[1], 0.0, 1000.0),
+            ("indirect weight", weights[2], 0.0, 1000.0),
             (
                 "lightfield positions",
                 lightfield.positions as f64,
@@ -195,8 +202,8 @@ impl BakeConfig {
         let enrichment = match &self.enrichment {
             None => "not enriched".to_owned(),
             Some(e) => format!(
-                "enriched (constant faces {}, indirect {})",
-                e.constant_weight, e.indirect_weight
+                "enriched (uniform {}, constant faces {}, indirect {})",
+                e.uniform_weight, e.constant_weight, e.indirect_weight
             ),
         };
         let (prior, field) = (&self.prior, &self.lightfield);
@@ -237,6 +244,7 @@ impl Default for PriorConfig {
 impl Default for Enrichment {
     fn default() -> Self {
         Self {
+            uniform_weight: 10.0,
             constant_weight: 0.2,
             indirect_weight: 0.2,
         }

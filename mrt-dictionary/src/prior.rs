@@ -70,7 +70,9 @@ pub fn light_prior(samples: &Matrix<f64>, classes: &ParityClasses, k_d: usize) -
 /// each scaled to its weight in Frobenius norm, put side by side and decomposed again.
 ///
 /// The first keeps what the prior had, the second follows shadows and differing albedos, the third what
-/// indirect light looks like when it becomes the direct light of the next bounce.
+/// indirect light looks like when it becomes the direct light of the next bounce. To the paper's three we
+/// add uniform light with a large weight, so that the bases hold it exactly: it is what many bounces tend
+/// to, and an error in it is an error in the level's energy.
 pub fn enriched_prior(
     prior: &LightPrior,
     indirect_basis: &Matrix<f64>,
@@ -84,8 +86,10 @@ pub fn enriched_prior(
         6 - shape.openings.len(),
         |texel, wall| f64::from(u8::from(texel / per_wall == wall)),
     );
+    let uniform = Matrix::from_fn(classes.point_count(), 1, |_, _| 1.0);
     let parts: Vec<(f64, Vec<Matrix<f64>>)> = vec![
         (1.0, prior.basis.classes.clone()),
+        (config.uniform_weight, fold_all(classes, &uniform)),
         (config.constant_weight, fold_all(classes, &constants)),
         (config.indirect_weight, fold_all(classes, indirect_basis)),
     ];

@@ -90,6 +90,8 @@ pub struct Mapped {
     pub crumbs: usize,
     /// Cells too flat, folded or in one another's way.
     pub misfits: usize,
+    /// Passages closed because the cells on both sides could not be brought to one height.
+    pub closed_passages: usize,
     /// True when the faces were found to be turned away from the rooms.
     pub is_reversed: bool,
     /// How much of the mesh the blocks hold.
@@ -178,9 +180,7 @@ fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapErr
         Some(cell) => cell,
         None => {
             let first = free_space(voxel_edge(FIRST_VOXELS), config.winding);
-            Columns::new(&first, 0.0)
-                .typical_height()
-                .ok_or(MapError::NoFreeSpace)?
+            usual_cell(&first, config.max_blocks).ok_or(MapError::NoFreeSpace)?
         }
     };
     let edge = (cell / VOXELS_A_CELL).max(voxel_edge(MOST_VOXELS));
@@ -216,9 +216,23 @@ fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapErr
         cell,
         crumbs: joined.crumbs,
         misfits: joined.misfits,
+        closed_passages: joined.closed_passages,
         is_reversed: space.is_reversed,
         ..from_level(joined.level)
     })
+}
+
+/// The rooms' typical height, which makes cubes; less in levels that are not all rooms of one size, as
+/// far as half the blocks allow.
+fn usual_cell(space: &FreeSpace, max_blocks: usize) -> Option<f64> {
+    let height = Columns::new(space, 0.0).typical_height()?;
+    let volume = space.free_count() as f64 * space.grid.edge.powi(3);
+    let is_one_room = volume < 8.0 * height.powi(3);
+    if is_one_room {
+        return Some(height);
+    }
+    let affordable = (2.0 * volume / max_blocks.max(1) as f64).cbrt();
+    Some(affordable.clamp(0.6 * height, height))
 }
 
 fn from_level(level: Level) -> Mapped {
@@ -227,6 +241,7 @@ fn from_level(level: Level) -> Mapped {
         cell: 0.0,
         crumbs: 0,
         misfits: 0,
+        closed_passages: 0,
         is_reversed: false,
         coverage: paint::Coverage::default(),
     }

@@ -1,26 +1,29 @@
-//! Where a point of the real mesh gets its indirect light from: one block, one of its walls, and the
-//! (u, v) on it (Loos et al. 2011, sections 6.2 and 7.2).
+//! Where a point of the real mesh gets its indirect light from: one block, its walls, and the (u, v) on
+//! them (Loos et al. 2011, sections 6.2 and 7.2).
 //!
-//! The paper assigns vertices to faces by a cube camera in the block's centre, which suits a scene in
-//! one block. Joined blocks take the wall that the surface is turned like instead: two blocks side
-//! by side then choose the same wall, and light runs on across their common side.
+//! The paper gives each vertex the face through which a cube camera in the block's centre sees it, which
+//! suits a scene in one block. Joined blocks take the wall that the surface is turned like instead: two
+//! blocks side by side then choose the same wall, and light runs on across their common side.
 
 mod cube_camera;
+mod lookup;
+mod trilinear;
 pub mod unwrap;
 
 use cube_camera::CubeCamera;
 use glam::{DVec3, Vec3};
+use lookup::Lookup;
 use mrt_core::bvh::Bvh;
 use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::Hexahedron;
 use mrt_runtime::level::{Block, Level};
+use trilinear::Trilinear;
 
 /// A point of a block's wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {
     /// Index into [`Level::blocks`].
     pub block: usize,
-    /// A wall of the block's turned cube.
+    /// A wall of the block's canonical shape.
     pub face: Face,
     /// Along the face's u axis, in [0, 1].
     pub u: f64,
@@ -32,12 +35,16 @@ pub struct Receiver {
 /// a surface lies on the border of two blocks or a little behind its own block's wall.
 const STEPS_OFF_SURFACE: [f64; 3] = [0.01, 0.06, 0.25];
 
-/// Weight of nearness against likeness of direction when a wall is chosen.
+/// Weight of nearness against likeness of direction when one wall is chosen.
 const NEARNESS_WEIGHT: f64 = 0.35;
 
 /// The cube camera decides for surfaces turned like the face that sees them, to this cosine; the sides
 /// of furniture are seen through the floor but turned like walls.
 const LEAST_FACING: f64 = 0.35;
+
+/// Cosines are raised by this and cubed to weigh walls: 99 % falls to the wall that a surface is
+/// parallel to, and where that is an opening, the walls around it share.
+const BLEND_OFFSET: f64 = 0.15;
 
 /// Blocks by place.
 #[derive(Clone, Debug)]
@@ -46,38 +53,31 @@ pub struct ReceiverMap {
     camera: Option<CubeCamera>,
     lookup: Lookup,
     smallest_diagonal: f64,
+    largest_diagonal: f64,
 }
 
 #[derive(Clone, Debug)]
 struct Placed {
-    warp: Hexahedron,
+    /// From the canonical cube.
+    map: Trilinear,
     orientation: CubeRotation,
     bounds: (DVec3, DVec3),
-    walls: Vec<Face>,
+    /// Of the canonical shape.
+    is_wall: [bool; 6],
 }
 
 impl ReceiverMap {
     /// Sorts the level's blocks by place.
     pub fn new(level: &Level) -> Self {
-        let blocks: Vec<Placed> = level
-            .blocks
-            .iter()
-            .map(|block| Placed {
-                warp: block.warp,
-                orientation: block.orientation,
-                bounds: block.warp.bounds(),
-                walls: walls(block),
-            })
-            .collect();
-        let smallest_diagonal = blocks
-            .iter()
-            .map(|block| block.warp.diagonal())
-            .fold(f64::MAX, f64::min);
+        let blocks: Vec<Placed> = level.blocks.iter().map(Placed::new).collect();
+        let bounds: Vec<_> = blocks.iter().map(|block| block.bounds).collect();
+        let diagonals = || level.blocks.iter().map(|block| block.warp.diagonal());
         Self {
-            lookup: Lookup::new(&blocks),
+            lookup: Lookup::new(&bounds),
             blocks,
             camera: None,
-            smallest_diagonal,
+            smallest_diagonal: diagonals().fold(f64::MAX, f64::min),
+            largest_diagonal: diagonals().fold(0.0, f64::max),
         }
     }
 
@@ -87,48 +87,54 @@ impl ReceiverMap {
         if let [block] = level.blocks.as_slice()
             && block.shape.openings.is_empty()
         {
-            map.camera = Some(CubeCamera::new(&block.warp, bvh));
+            map.camera = Some(CubeCamera::new(&block.canonical_warp(), bvh));
         }
         map
     }
 
-    /// The receiver of a surface point with a unit normal out of the surface, `None` only without
+    /// The one receiver of a surface point with a unit normal out of the surface, `None` only without
     /// blocks.
     pub fn receiver(&self, point: Vec3, normal: Vec3) -> Option<Receiver> {
         let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
         let (block, unit) = self.block_in_front(point, normal)?;
         let placed = &self.blocks[block];
-        let seen = self
-            .camera
-            .as_ref()
-            .and_then(|camera| camera.face_that_sees(&placed.warp, point, unit))
-            .filter(|&face| placed.facing(face, unit, normal) > LEAST_FACING);
-        let face = seen.or_else(|| placed.wall_towards(unit, normal))?;
-        Some(Receiver {
-            block,
-            face,
-            u: unit[face.u_axis()],
-            v: unit[face.v_axis()],
-        })
+        let facing = placed.facing(unit, normal);
+        let face = self.face_seen(point, unit, &facing).or_else(|| {
+            let score = |face: Face| facing[face.index()] - NEARNESS_WEIGHT * depth(face, unit);
+            placed
+                .walls()
+                .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+        })?;
+        Some(on_face(block, face, unit))
     }
 
-    /// Where a point lies on a given wall of a given block, moved inside it.
-    pub fn receiver_on(&self, point: Vec3, block: usize, face: Face) -> Receiver {
-        let unit = self.blocks[block].unit(point.as_dvec3());
-        Receiver {
-            block,
-            face,
-            u: unit[face.u_axis()],
-            v: unit[face.v_axis()],
+    /// The receivers of a surface point and their weights, which sum to one and change smoothly with the
+    /// normal; for pictures, where each pixel can read several places of a lightmap.
+    pub fn blended(&self, point: Vec3, normal: Vec3) -> [Option<(Receiver, f64)>; 6] {
+        let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
+        let mut receivers = [None; 6];
+        let Some((block, unit)) = self.block_in_front(point, normal) else {
+            return receivers;
+        };
+        let placed = &self.blocks[block];
+        let facing = placed.facing(unit, normal);
+        if let Some(face) = self.face_seen(point, unit, &facing) {
+            receivers[0] = Some((on_face(block, face, unit), 1.0));
+            return receivers;
         }
+        let weight = |face: Face| (facing[face.index()] + BLEND_OFFSET).max(0.0).powi(3);
+        let total: f64 = placed.walls().map(weight).sum();
+        for face in placed.walls() {
+            if total > 0.0 && weight(face) > 0.0 {
+                receivers[face.index()] = Some((on_face(block, face, unit), weight(face) / total));
+            }
+        }
+        receivers
     }
 
-    /// The receiver in the block's canonical shape: face, u, v.
-    pub fn canonical(&self, receiver: &Receiver) -> (Face, f64, f64) {
-        let canonical = self.blocks[receiver.block].orientation.inverse();
-        let face = canonical.face(receiver.face);
-        let point = canonical.point(receiver.face.point(receiver.u, receiver.v));
-        (face, point[face.u_axis()], point[face.v_axis()])
+    /// Where a point lies on a wall of a block, moved inside it.
+    pub fn receiver_on(&self, point: Vec3, block: usize, face: Face) -> Receiver {
+        on_face(block, face, self.blocks[block].unit(point.as_dvec3()))
     }
 
     /// The block that contains a point, or else the nearest, and the distance to it in metres.
@@ -137,35 +143,46 @@ impl ReceiverMap {
         Some((block, distance))
     }
 
+    /// A canonical face as the level names it.
+    pub fn turned_face(&self, receiver: &Receiver) -> Face {
+        self.blocks[receiver.block].orientation.face(receiver.face)
+    }
+
+    fn face_seen(&self, point: DVec3, unit: DVec3, facing: &[f64; 6]) -> Option<Face> {
+        let camera = self.camera.as_ref()?;
+        let face = camera.face_that_sees(point, unit)?;
+        (facing[face.index()] > LEAST_FACING).then_some(face)
+    }
+
     /// The block that the surface looks into, with the point's place in its unit cube.
     fn block_in_front(&self, point: DVec3, normal: DVec3) -> Option<(usize, DVec3)> {
-        let mut nearest: Option<(usize, f64)> = None;
+        let mut nearest: Option<(usize, DVec3, f64)> = None;
         for step in STEPS_OFF_SURFACE {
-            let (block, _, distance) =
-                self.nearest(point + normal * step * self.smallest_diagonal)?;
-            if nearest.is_none_or(|(_, least)| distance < least) {
-                nearest = Some((block, distance));
+            let place = point + normal * step * self.smallest_diagonal;
+            let found = self.nearest(place)?;
+            if nearest.is_none_or(|(.., least)| found.2 < least) {
+                nearest = Some(found);
             }
-            if distance == 0.0 {
+            if found.2 == 0.0 {
                 break;
             }
         }
-        let (block, _) = nearest?;
-        Some((block, self.blocks[block].unit(point)))
+        let (block, unit, _) = nearest?;
+        Some((block, self.blocks[block].unit_from(unit, point)))
     }
 
     fn nearest(&self, point: DVec3) -> Option<(usize, DVec3, f64)> {
         let mut best: Option<(usize, DVec3, f64)> = None;
+        // Tolerance of the inverse map, in metres.
+        let rounding = 2e-6 * self.largest_diagonal;
         for &block in self.lookup.candidates(point) {
             let placed = &self.blocks[block as usize];
             let least = best.map_or(f64::MAX, |(_, _, least)| least);
-            if box_distance(point, placed.bounds) >= least {
+            if lookup::box_distance(point, placed.bounds) >= least {
                 continue;
             }
             let unit = placed.unit(point);
-            // Rounding of the inverse map, in metres.
-            let rounding = 1e-9 * self.smallest_diagonal;
-            let distance = placed.warp.point(unit).distance(point);
+            let distance = placed.map.point(unit).distance(point);
             let distance = if distance < rounding { 0.0 } else { distance };
             if distance < least {
                 best = Some((block as usize, unit, distance));
@@ -179,113 +196,127 @@ impl ReceiverMap {
 }
 
 impl Placed {
-    /// The wall that a surface is turned like; of several the nearest.
-    fn wall_towards(&self, unit: DVec3, normal: DVec3) -> Option<Face> {
-        let score = |face: Face| {
-            let axis = face.axis();
-            let depth = if face.is_positive() {
-                1.0 - unit[axis]
-            } else {
-                unit[axis]
-            };
-            self.facing(face, unit, normal) - NEARNESS_WEIGHT * depth
-        };
-        self.walls
-            .iter()
-            .copied()
-            .max_by(|&a, &b| score(a).total_cmp(&score(b)))
+    fn new(block: &Block) -> Self {
+        let warp = block.canonical_warp();
+        Self {
+            map: Trilinear::new(&warp),
+            orientation: block.orientation,
+            bounds: warp.bounds(),
+            is_wall: Face::ALL.map(|face| !block.shape.is_open(face)),
+        }
     }
 
-    /// Cosine between a surface's normal and a wall's.
-    fn facing(&self, face: Face, unit: DVec3, normal: DVec3) -> f64 {
-        let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
-        normal.dot(self.warp.face_normal(face, u, v))
+    fn walls(&self) -> impl Iterator<Item = Face> + '_ {
+        Face::ALL
+            .into_iter()
+            .filter(|face| self.is_wall[face.index()])
+    }
+
+    /// Cosines between a surface's normal and the inward normals of the faces around a point.
+    fn facing(&self, unit: DVec3, normal: DVec3) -> [f64; 6] {
+        let gradients = self.map.gradients(unit).unwrap_or([DVec3::ZERO; 3]);
+        let along = gradients.map(|gradient| gradient.normalize_or_zero().dot(normal));
+        Face::ALL.map(|face| {
+            let cosine = along[face.axis()];
+            if face.is_positive() { -cosine } else { cosine }
+        })
     }
 
     /// The point's place in the unit cube, moved inside it.
     fn unit(&self, point: DVec3) -> DVec3 {
         // The inverse of a warp is unsure far outside; there the nearest point of the bounds will do.
+        self.unit_from(DVec3::splat(0.5), point)
+    }
+
+    /// As [`Placed::unit`], faster from a good guess.
+    fn unit_from(&self, guess: DVec3, point: DVec3) -> DVec3 {
         let inside = point.clamp(self.bounds.0, self.bounds.1);
-        let unit = self.warp.inverse(inside).unwrap_or(DVec3::splat(0.5));
+        let unit = self.map.inverse(guess, inside).unwrap_or(guess);
         unit.clamp(DVec3::ZERO, DVec3::ONE)
     }
 }
 
-/// Faces of the turned cube that are not openings.
-fn walls(block: &Block) -> Vec<Face> {
-    Face::ALL
-        .into_iter()
-        .filter(|&face| !block.is_open(face))
-        .collect()
+fn on_face(block: usize, face: Face, unit: DVec3) -> Receiver {
+    Receiver {
+        block,
+        face,
+        u: unit[face.u_axis()],
+        v: unit[face.v_axis()],
+    }
 }
 
-/// Distance from a point to a box, zero inside.
-fn box_distance(point: DVec3, (min, max): (DVec3, DVec3)) -> f64 {
-    point.distance(point.clamp(min, max))
+/// Distance from a face, in block widths.
+fn depth(face: Face, unit: DVec3) -> f64 {
+    let along = unit[face.axis()];
+    if face.is_positive() {
+        1.0 - along
+    } else {
+        along
+    }
 }
 
-/// A coarse grid over the level; each cell lists every block that can be nearest to a point in it.
-#[derive(Clone, Debug)]
-struct Lookup {
-    min: DVec3,
-    edge: DVec3,
-    candidates: Vec<Vec<u32>>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Cells along each axis of the lookup.
-const LOOKUP_CELLS: usize = 24;
+    fn corridor() -> Level {
+        let cells = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 0, 1]];
+        Level::from_cells(&cells, Vec3::splat(0.5)).expect("flat cells")
+    }
 
-impl Lookup {
-    fn new(blocks: &[Placed]) -> Self {
-        let min = blocks
-            .iter()
-            .map(|b| b.bounds.0)
-            .fold(DVec3::MAX, DVec3::min);
-        let max = blocks
-            .iter()
-            .map(|b| b.bounds.1)
-            .fold(DVec3::MIN, DVec3::max);
-        // Meshes reach beyond the blocks; further out, the outermost cells serve.
-        let margin = (max - min) * 0.1;
-        let (min, max) = (min - margin, max + margin);
-        let edge = (max - min) / LOOKUP_CELLS as f64;
-        let half = edge / 2.0;
-        let mut candidates = Vec::with_capacity(LOOKUP_CELLS.pow(3));
-        for z in 0..LOOKUP_CELLS {
-            for y in 0..LOOKUP_CELLS {
-                for x in 0..LOOKUP_CELLS {
-                    let center = min + (DVec3::new(x as f64, y as f64, z as f64) + 0.5) * edge;
-                    let nearest = blocks
-                        .iter()
-                        .map(|block| box_distance(center, block.bounds))
-                        .fold(f64::MAX, f64::min);
-                    // The nearest box may hold a slanted block whose wall is further away.
-                    let reach = nearest + 2.0 * half.length();
-                    let near = |block: &Placed| {
-                        let grown = (block.bounds.0 - half, block.bounds.1 + half);
-                        box_distance(center, grown) <= reach
-                    };
-                    let list = (0..blocks.len())
-                        .filter(|&block| near(&blocks[block]))
-                        .map(|block| block as u32)
-                        .collect();
-                    candidates.push(list);
-                }
-            }
-        }
-        Self {
-            min,
-            edge,
-            candidates,
+    #[test]
+    fn a_floor_runs_on_across_blocks() {
+        let map = ReceiverMap::new(&corridor());
+        for k in 0..29 {
+            let point = Vec3::new(0.05 + 0.1 * k as f32, -0.03, 0.4);
+            let receiver = map.receiver(point, Vec3::Y).expect("blocks");
+            assert_eq!(receiver.block, point.x as usize);
+            assert_eq!(map.turned_face(&receiver), Face::NegY);
         }
     }
 
-    fn candidates(&self, point: DVec3) -> &[u32] {
-        let cell = ((point - self.min) / self.edge)
-            .clamp(DVec3::ZERO, DVec3::splat(LOOKUP_CELLS as f64 - 1.0))
-            .as_usizevec3();
-        self.candidates
-            .get((cell.z * LOOKUP_CELLS + cell.y) * LOOKUP_CELLS + cell.x)
-            .map_or(&[], Vec::as_slice)
+    #[test]
+    fn a_wall_between_rooms_belongs_to_the_room_that_it_faces() {
+        // Blocks 1 and 3 do not touch; between 0 and the free place beside it stands a wall at z = 1.
+        let mut level = corridor();
+        level.blocks.extend(
+            Level::from_cells(&[[0, 0, 1]], Vec3::ONE)
+                .expect("a cell")
+                .blocks,
+        );
+        let map = ReceiverMap::new(&level);
+        let point = Vec3::new(0.5, 0.5, 1.0);
+        let block = |normal| map.receiver(point, normal).expect("blocks").block;
+        assert_eq!(block(Vec3::NEG_Z), 0);
+        assert_eq!(block(Vec3::Z), 4);
+    }
+
+    #[test]
+    fn openings_receive_nothing_and_weights_sum_to_one() {
+        let level = corridor();
+        let map = ReceiverMap::new(&level);
+        for k in 0..64 {
+            let angle = 0.1 * k as f32;
+            let normal = Vec3::new(angle.cos(), 0.3 * (3.0 * angle).sin(), angle.sin()).normalize();
+            let point = Vec3::new(1.5, 0.4, 0.5);
+            let one = map.receiver(point, normal).expect("blocks");
+            let parts: Vec<_> = map.blended(point, normal).into_iter().flatten().collect();
+            let total: f64 = parts.iter().map(|(_, weight)| weight).sum();
+            assert!((total - 1.0).abs() < 1e-12);
+            for receiver in parts.iter().map(|(part, _)| part).chain([&one]) {
+                assert!(!level.blocks[receiver.block].shape.is_open(receiver.face));
+            }
+        }
+    }
+
+    #[test]
+    fn points_far_outside_find_the_nearest_block() {
+        let map = ReceiverMap::new(&corridor());
+        let (block, distance) = map
+            .nearest_block(Vec3::new(-7.0, 0.5, 0.5))
+            .expect("blocks");
+        assert_eq!(block, 0);
+        assert!((distance - 7.0).abs() < 1e-6);
+        assert_eq!(map.nearest_block(Vec3::new(2.5, 0.5, 1.5)), Some((3, 0.0)));
     }
 }

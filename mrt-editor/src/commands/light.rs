@@ -10,7 +10,9 @@ use crate::import::{ImportError, ImportReport, read_scene};
 use crate::picture::camera::Camera;
 use crate::picture::file::WriteError;
 use crate::picture::lit::{LitScene, SphereLight};
-use crate::picture::placement::{Surroundings, camera_at_light, light_places, overview};
+use crate::picture::placement::{
+    Surroundings, VIEW_ANGLE_RAD, camera_at_light, light_places, overview,
+};
 use crate::picture::tone::auto_exposure;
 use crate::picture::{Picture, render};
 use crate::receiver::ReceiverMap;
@@ -32,8 +34,12 @@ use std::time::Instant;
 /// A light's radius where none is given, in widths of its block: 1.6 texels of the standard dictionary.
 const LIGHT_RADIUS: f64 = 0.1;
 
-/// Lights placed when none is given.
-const DEFAULT_LIGHTS: usize = 3;
+/// Lights placed when none is given: one for this many blocks, up to the most.
+const BLOCKS_A_LIGHT: usize = 12;
+const MOST_DEFAULT_LIGHTS: usize = 6;
+
+/// Cameras placed at lights when none is given.
+const DEFAULT_VIEWS: usize = 2;
 
 /// Faces that meet at less than this angle look smooth, radians.
 const CREASE_ANGLE_RAD: f64 = 0.7;
@@ -258,7 +264,12 @@ fn place_lights(
         volume.abs().cbrt()
     };
     if args.light.is_empty() {
-        let places = light_places(surroundings, level, DEFAULT_LIGHTS);
+        let count = level
+            .blocks
+            .len()
+            .div_ceil(BLOCKS_A_LIGHT)
+            .min(MOST_DEFAULT_LIGHTS);
+        let places = light_places(surroundings, level, count);
         if places.is_empty() {
             return Err(LightCommandError::NoPlace);
         }
@@ -368,7 +379,7 @@ fn views(
     let aspect = width as f32 / height as f32;
     let mut cameras: Vec<(String, Camera, bool)> = Vec::new();
     for (index, view) in args.camera.iter().enumerate() {
-        let camera = Camera::look_at(view.from, view.to, 60f32.to_radians(), aspect);
+        let camera = Camera::look_at(view.from, view.to, VIEW_ANGLE_RAD, aspect);
         let camera = camera.ok_or(LightCommandError::Camera {
             from: view.from,
             to: view.to,
@@ -376,7 +387,7 @@ fn views(
         cameras.push((format!("view{}", index + 1), camera, false));
     }
     if cameras.is_empty() {
-        for (index, light) in lit.lights.iter().enumerate() {
+        for (index, light) in lit.lights.iter().take(DEFAULT_VIEWS).enumerate() {
             let camera = camera_at_light(surroundings, light.position, aspect);
             cameras.extend(camera.map(|camera| (format!("view{}", index + 1), camera, false)));
         }

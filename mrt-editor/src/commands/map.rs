@@ -100,6 +100,7 @@ struct Report {
     cell_m: f64,
     dropped_crumbs: usize,
     dropped_misfits: usize,
+    closed_passages: usize,
     faces_reversed: bool,
     area_share: Coverage,
     seconds: f64,
@@ -147,6 +148,7 @@ impl Report {
             cell_m: mapped.cell,
             dropped_crumbs: mapped.crumbs,
             dropped_misfits: mapped.misfits,
+            closed_passages: mapped.closed_passages,
             faces_reversed: mapped.is_reversed,
             area_share: mapped.coverage,
             seconds: start.elapsed().as_secs_f64(),
@@ -165,6 +167,7 @@ impl Report {
         row("cell", format!("{:.3} m", self.cell_m));
         row("dropped crumbs", self.dropped_crumbs.to_string());
         row("dropped misfits", self.dropped_misfits.to_string());
+        row("closed passages", self.closed_passages.to_string());
         if self.faces_reversed {
             row(
                 "faces",

@@ -2,7 +2,7 @@
 //! between them.
 
 use super::columns::Columns;
-use super::voxels::FreeSpace;
+use super::voxels::{FreeSpace, VoxelGrid};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -28,6 +28,9 @@ pub struct Cell {
     pub ceiling: [f64; 4],
     /// Free volume, voxels.
     pub volume: usize,
+    /// Share of each side (-x, +x, -z, +z) through which free space ends without a surface: the level
+    /// is open there, as at a window or the missing front of a stage.
+    pub outside: [f64; 4],
 }
 
 /// The common side of two cells.
@@ -43,6 +46,8 @@ pub struct Passage {
     pub openness: f64,
     /// Area of the smaller side, voxel sides.
     pub area: f64,
+    /// Height that both sides share over the height that both reach through: 1 for equal sides.
+    pub overlap: f64,
 }
 
 /// Cells and the sides they share.
@@ -98,7 +103,14 @@ pub fn cut_into_cells(space: &FreeSpace, columns: &Columns, lines: &GridLines) -
             let (xs, zs) = (lines.gap(0, i), lines.gap(1, k));
             for storey in storeys(columns, &xs, &zs) {
                 let cell = cells.len();
-                if let Some(found) = gather(columns, [&xs, &zs], &storey, &mut cell_of_run, cell) {
+                if let Some(found) = gather(
+                    &space.grid,
+                    columns,
+                    [&xs, &zs],
+                    &storey,
+                    &mut cell_of_run,
+                    cell,
+                ) {
                     cells.push(Cell {
                         column: [i, k],
                         ..found
@@ -107,8 +119,50 @@ pub fn cut_into_cells(space: &FreeSpace, columns: &Columns, lines: &GridLines) -
             }
         }
     }
+    find_outside(space, columns, lines, &mut cells, &cell_of_run);
     let passages = passages(space, columns, lines, &cells, &cell_of_run);
     Cells { cells, passages }
+}
+
+/// Measures how much of each cell's sides is open to places that are no free space.
+fn find_outside(
+    space: &FreeSpace,
+    columns: &Columns,
+    lines: &GridLines,
+    cells: &mut [Cell],
+    cell_of_run: &[Option<usize>],
+) {
+    let grid = &space.grid;
+    for (run, cell) in columns.runs.iter().zip(cell_of_run) {
+        let Some(cell) = *cell else {
+            continue;
+        };
+        for axis in 0..2 {
+            let gap = lines.gap(axis, cells[cell].column[axis]);
+            let (at, stride) = (run.column[axis], grid.stride(2 * axis));
+            let open_rows = |is_out: &dyn Fn(usize) -> bool| {
+                let index = |y: usize| grid.index([run.column[0], y, run.column[1]]);
+                run.rows.clone().filter(|&y| is_out(index(y))).count() as f64
+            };
+            let cut = &space.cut[2 * axis];
+            if at == gap.start && at > 0 {
+                let is_out = |i: usize| !space.free[i - stride] && cut[i - stride].is_nan();
+                cells[cell].outside[2 * axis] += open_rows(&is_out);
+            }
+            if at + 1 == gap.end && at + 1 < columns.count[axis] {
+                let is_out = |i: usize| !space.free[i + stride] && cut[i].is_nan();
+                cells[cell].outside[2 * axis + 1] += open_rows(&is_out);
+            }
+        }
+    }
+    for cell in cells {
+        for side in 0..4 {
+            let (axis, positive) = (side / 2, side % 2 == 1);
+            let width = lines.gap(1 - axis, cell.column[1 - axis]).len() as f64;
+            let area = (width * cell.side_height(axis, positive) / grid.edge).max(1.0);
+            cell.outside[side] = (cell.outside[side] / area).min(1.0);
+        }
+    }
 }
 
 /// Heights (voxel rows) where enough of the columns are free and run on into one another.
@@ -146,6 +200,7 @@ fn storeys(columns: &Columns, xs: &Range<usize>, zs: &Range<usize>) -> Vec<Range
 
 /// Claims the runs that belong to a storey and measures its corners.
 fn gather(
+    grid: &VoxelGrid,
     columns: &Columns,
     [xs, zs]: [&Range<usize>; 2],
     storey: &Range<usize>,
@@ -164,11 +219,14 @@ fn gather(
                 if shared <= 0 || 2 * (shared as usize) < run.rows.len().min(storey.len()) {
                     continue;
                 }
+                // A shaft or stairwell must not pull the storey's ceiling or floor through others.
+                let (low, high) = (grid.boundary(1, storey.start), grid.boundary(1, storey.end));
+                let slack = 0.5 * (high - low);
                 // Quarters overlap by a half, so that a narrow pillar cannot decide for a corner.
                 for (k, (floors, ceilings)) in floors.iter_mut().zip(&mut ceilings).enumerate() {
                     if is_near_corner(x, xs, k & 1) && is_near_corner(z, zs, k >> 1) {
-                        floors.push(run.floor);
-                        ceilings.push(run.ceiling);
+                        floors.push(run.floor.max(low - slack));
+                        ceilings.push(run.ceiling.min(high + slack));
                     }
                 }
                 cell_of_run[index] = Some(cell);
@@ -185,6 +243,7 @@ fn gather(
         floor,
         ceiling,
         volume,
+        outside: [0.0; 4],
     })
 }
 
@@ -201,6 +260,18 @@ fn is_near_corner(position: usize, range: &Range<usize>, side: usize) -> bool {
 fn median(values: &mut [f64]) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+/// Shared over total height of the sides of two cells that meet.
+fn overlap(low: &Cell, high: &Cell, axis: usize) -> f64 {
+    let range = |cell: &Cell, positive: bool| {
+        let corners = side_corners(axis, positive);
+        let mean = |heights: &[f64; 4]| corners.map(|k| heights[k]).iter().sum::<f64>() / 2.0;
+        (mean(&cell.floor), mean(&cell.ceiling))
+    };
+    let (a, b) = (range(low, true), range(high, false));
+    let shared = a.1.min(b.1) - a.0.max(b.0);
+    (shared / (a.1.max(b.1) - a.0.min(b.0))).max(0.0)
 }
 
 /// Counts the links between cells across every inner line and keeps the widest for each side.
@@ -256,6 +327,7 @@ fn passages(
                     axis,
                     openness,
                     area,
+                    overlap: overlap(&cells[low], &cells[high], axis),
                 }
             })
             .collect();

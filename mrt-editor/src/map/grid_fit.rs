@@ -10,7 +10,7 @@ use mrt_runtime::level::{Block, Connection, Level, LevelError, Opening, shape_wi
 /// What becomes a block and a connection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JoinConfig {
-    /// Least share of a side that must be open for a connection.
+    /// Least share of a side that must be open for a connection, or to be open to the outside.
     pub openness: f64,
     /// Groups of joined cells below this share of the free volume are dropped.
     pub crumb_share: f64,
@@ -25,7 +25,15 @@ pub struct GridLevel {
     pub crumbs: usize,
     /// Cells too flat, folded or in one another's way.
     pub misfits: usize,
+    /// Passages closed because the cells on both sides could not be brought to one height.
+    pub closed_passages: usize,
 }
+
+/// Sides whose heights share less than this are not joined: one block would be squeezed flat.
+const LEAST_OVERLAP: f64 = 0.08;
+
+/// Share of a side that has to be open to the outside for the block to be.
+const LEAST_OUTSIDE: f64 = 0.6;
 
 /// Joins the cells.
 ///
@@ -45,36 +53,50 @@ pub fn join_cells(
     });
     let mut is_kept = vec![true; cells.cells.len()];
     let crumbs = drop_crumbs(cells, config, &mut is_kept);
-    let mut misfits = 0;
+    let mut open: Vec<Passage> = cells
+        .passages
+        .iter()
+        .copied()
+        .filter(|p| p.openness >= config.openness && p.overlap >= LEAST_OVERLAP)
+        .filter(|p| is_kept[p.low] && is_kept[p.high])
+        .collect();
+    let (mut misfits, mut closed_passages) = (0, 0);
+    // One passage or one cell a round goes, so this ends.
     loop {
         let kept: Vec<usize> = (0..cells.cells.len())
             .filter(|&cell| is_kept[cell])
             .collect();
-        let open: Vec<Passage> = cells
-            .passages
-            .iter()
-            .copied()
-            .filter(|p| p.openness >= config.openness && is_kept[p.low] && is_kept[p.high])
-            .collect();
         let warps = warps(&cells.cells, &open, &coordinates);
-        let level = assemble_level(&kept, &open, &warps);
+        let level = assemble_level(&cells.cells, &kept, &open, &warps);
         let volume = |block: usize| cells.cells[kept[block]].volume;
-        // One block a round goes, so this ends.
         let misfit = match level.check() {
             Ok(()) => {
                 return Ok(GridLevel {
                     level,
                     crumbs,
                     misfits,
+                    closed_passages,
                 });
             }
-            Err(LevelError::Warp { block, .. }) => block,
-            Err(LevelError::Overlap { a, b, .. }) if volume(a) < volume(b) => a,
-            Err(LevelError::Overlap { b, .. }) => b,
+            Err(LevelError::Warp { block, .. }) => kept[block],
+            Err(LevelError::Overlap { a, b, .. }) if volume(a) < volume(b) => kept[a],
+            Err(LevelError::Overlap { b, .. }) => kept[b],
             Err(error) => return Err(error),
         };
-        is_kept[kept[misfit]] = false;
-        misfits += 1;
+        let worst = (0..open.len())
+            .filter(|&k| open[k].low == misfit || open[k].high == misfit)
+            .min_by(|&a, &b| open[a].overlap.total_cmp(&open[b].overlap));
+        match worst.filter(|&k| open[k].overlap < 0.8) {
+            Some(passage) => {
+                open.remove(passage);
+                closed_passages += 1;
+            }
+            None => {
+                open.retain(|p| p.low != misfit && p.high != misfit);
+                is_kept[misfit] = false;
+                misfits += 1;
+            }
+        }
     }
 }
 
@@ -133,7 +155,7 @@ fn drop_crumbs(cells: &Cells, config: &JoinConfig, is_kept: &mut [bool]) -> usiz
     crumbs
 }
 
-/// The hexahedron of each cell. Corners of cells joined around one grid point take the mean of their
+/// The hexahedron of each cell. Corners of cells joined around one grid point take a mean of their
 /// heights, so that joined sides coincide to the last bit; sides lie in upright planes along the
 /// lines, so that cells of different columns cannot overlap.
 fn warps(cells: &[Cell], open: &[Passage], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexahedron> {
@@ -148,15 +170,18 @@ fn warps(cells: &[Cell], open: &[Passage], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexa
     let mut sums = vec![[0.0; 3]; 4 * cells.len()];
     for (cell, found) in cells.iter().enumerate() {
         for k in 0..4 {
+            // Where a corridor leads into a hall, the opening is the corridor's: low sides decide.
+            let height = (found.ceiling[k] - found.floor[k]).max(1e-6);
+            let weight = 1.0 / height;
             let sum = &mut sums[groups.find(4 * cell + k)];
-            sum[0] += found.floor[k];
-            sum[1] += found.ceiling[k];
-            sum[2] += 1.0;
+            sum[0] += weight * found.floor[k];
+            sum[1] += weight * found.ceiling[k];
+            sum[2] += weight;
         }
     }
     let mut heights: Vec<[f64; 2]> = sums
         .iter()
-        .map(|&[floor, ceiling, count]| [floor / count, ceiling / count])
+        .map(|&[floor, ceiling, weight]| [floor / weight, ceiling / weight])
         .collect();
     separate_storeys(cells, &mut groups, &mut heights);
     cells
@@ -176,26 +201,41 @@ fn warps(cells: &[Cell], open: &[Passage], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexa
         .collect()
 }
 
-/// Where a ceiling was drawn above the next storey's floor by its neighbours, both meet halfway.
+/// Puts a level plane between storeys whose ceiling and floor were drawn into one another by their
+/// neighbours. Ceilings only sink and floors only rise, so that what was apart stays apart.
 fn separate_storeys(cells: &[Cell], groups: &mut Groups, heights: &mut [[f64; 2]]) {
-    for (upper, pair) in cells.windows(2).enumerate() {
+    for (lower, pair) in cells.windows(2).enumerate() {
         // Cells of one column stand next to each other, lowest first.
         if pair[0].column != pair[1].column {
             continue;
         }
-        for k in 0..4 {
-            let below = groups.find(4 * upper + k);
-            let above = groups.find(4 * (upper + 1) + k);
-            if below != above && heights[below][1] > heights[above][0] {
-                let middle = (heights[below][1] + heights[above][0]) / 2.0;
-                heights[below][1] = middle;
-                heights[above][0] = middle;
-            }
+        let below: [usize; 4] = std::array::from_fn(|k| groups.find(4 * lower + k));
+        let above: [usize; 4] = std::array::from_fn(|k| groups.find(4 * (lower + 1) + k));
+        let highest = below
+            .map(|group| heights[group][1])
+            .into_iter()
+            .fold(f64::MIN, f64::max);
+        let lowest = above
+            .map(|group| heights[group][0])
+            .into_iter()
+            .fold(f64::MAX, f64::min);
+        if highest <= lowest {
+            continue;
+        }
+        let plane = (0..4)
+            .map(|k| heights[below[k]][1] + heights[above[k]][0])
+            .sum::<f64>()
+            / 8.0;
+        for group in below {
+            heights[group][1] = heights[group][1].min(plane);
+        }
+        for group in above {
+            heights[group][0] = heights[group][0].max(plane);
         }
     }
 }
 
-fn assemble_level(kept: &[usize], open: &[Passage], warps: &[Hexahedron]) -> Level {
+fn assemble_level(cells: &[Cell], kept: &[usize], open: &[Passage], warps: &[Hexahedron]) -> Level {
     let mut block_of_cell = vec![usize::MAX; warps.len()];
     for (block, &cell) in kept.iter().enumerate() {
         block_of_cell[cell] = block;
@@ -212,6 +252,16 @@ fn assemble_level(kept: &[usize], open: &[Passage], warps: &[Hexahedron]) -> Lev
         faces[a.block].push(a.face);
         faces[b.block].push(b.face);
         connections.push(Connection { a, b });
+    }
+    for (&cell, faces) in kept.iter().zip(&mut faces) {
+        for (side, face) in [Face::NegX, Face::PosX, Face::NegZ, Face::PosZ]
+            .into_iter()
+            .enumerate()
+        {
+            if cells[cell].outside[side] >= LEAST_OUTSIDE && !faces.contains(&face) {
+                faces.push(face);
+            }
+        }
     }
     let blocks = kept
         .iter()

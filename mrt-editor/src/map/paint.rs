@@ -43,7 +43,7 @@ pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoin
         if let Some(receiver) = receivers.receiver(point.position, point.normal) {
             let material = mesh.triangle_materials[point.triangle] as usize;
             let albedo = mesh.materials[material].albedo.as_dvec3();
-            let (sum, area) = &mut walls[receiver.block][receiver.face.index()];
+            let (sum, area) = &mut walls[receiver.block][receivers.turned_face(&receiver).index()];
             *sum += albedo * point.area;
             *area += point.area;
         }

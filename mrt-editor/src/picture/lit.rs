@@ -8,8 +8,11 @@ use mrt_core::sampling::{hash, sobol_point, sphere_from_square, square_from_unit
 use mrt_runtime::atlas::AtlasLayout;
 use std::f32::consts::PI;
 
-/// Shadow rays a light and view ray.
-const SHADOW_RAYS: u32 = 4;
+/// Shadow rays to each light that are always cast.
+const FIRST_SHADOW_RAYS: u32 = 2;
+
+/// Shadow rays where the first disagree.
+const SHADOW_RAYS: u32 = 8;
 
 /// A sphere light; irradiance is `intensity cos θ / max(d², radius²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,28 +115,42 @@ impl LitScene<'_> {
             if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
                 continue;
             }
-            let start = surface.position + surface.flat_normal * (1e-4 * offset.length());
-            let mut visible = 0;
-            for k in 0..SHADOW_RAYS {
-                let square = square_from_unit(sobol_point(k, seed));
-                let on_light = sphere_from_square(square).as_vec3() * light.radius;
-                let towards = light.position + on_light - start;
-                visible += u32::from(!self.bvh.is_occluded(start, towards, 1.0));
-            }
-            let share = visible as f32 / SHADOW_RAYS as f32;
+            let share = self.visible_share(surface, light, seed);
             sum += light.intensity * (cosine / squared * share);
         }
         sum
     }
 
-    /// Irradiance from the lightmap.
-    fn indirect(&self, surface: &Surface) -> Vec3 {
-        let lookup = || {
-            let receiver = self.receivers.receiver(surface.position, surface.normal)?;
-            let (face, u, v) = self.receivers.canonical(&receiver);
-            let pixel = self.atlas.pixel(receiver.block, face, u as f32, v as f32)?;
-            Some(Vec3::from_array(self.atlas.sample(self.lightmap, pixel)))
+    /// Share of a light that is seen: two rays where they agree, more in penumbras.
+    fn visible_share(&self, surface: &Surface, light: &SphereLight, seed: u32) -> f32 {
+        let distance = light.position.distance(surface.position);
+        let start = surface.position + surface.flat_normal * (1e-4 * distance);
+        let is_visible = |k: u32| {
+            let square = square_from_unit(sobol_point(k, seed));
+            let on_light = sphere_from_square(square).as_vec3() * light.radius;
+            let towards = light.position + on_light - start;
+            u32::from(!self.bvh.is_occluded(start, towards, 1.0))
         };
-        lookup().unwrap_or(Vec3::ZERO)
+        let first: u32 = (0..FIRST_SHADOW_RAYS).map(is_visible).sum();
+        if first == 0 || first == FIRST_SHADOW_RAYS {
+            return (first / FIRST_SHADOW_RAYS) as f32;
+        }
+        let rest: u32 = (FIRST_SHADOW_RAYS..SHADOW_RAYS).map(is_visible).sum();
+        (first + rest) as f32 / SHADOW_RAYS as f32
+    }
+
+    /// Irradiance from the lightmap: one wall would do, but curved surfaces would show where it changes.
+    fn indirect(&self, surface: &Surface) -> Vec3 {
+        let parts = self.receivers.blended(surface.position, surface.normal);
+        parts
+            .into_iter()
+            .flatten()
+            .filter_map(|(receiver, weight)| {
+                let (u, v) = (receiver.u as f32, receiver.v as f32);
+                let pixel = self.atlas.pixel(receiver.block, receiver.face, u, v)?;
+                let irradiance = self.atlas.sample(self.lightmap, pixel);
+                Some(Vec3::from_array(irradiance) * weight as f32)
+            })
+            .sum()
     }
 }

@@ -6,6 +6,14 @@ use mrt_core::bvh::Bvh;
 use mrt_core::mesh::{TriangleMesh, bounds};
 use mrt_core::sampling::{hammersley_point, sphere_from_square, square_from_unit};
 use mrt_runtime::level::{Block, Level};
+use std::f32::consts::TAU;
+
+/// Vertical angle of view.
+pub const VIEW_ANGLE_RAD: f32 = 1.05;
+
+/// Rays across and down a trial picture.
+const TRIAL_COLUMNS: usize = 24;
+const TRIAL_ROWS: usize = 14;
 
 /// Rays that look around from a point.
 const LOOKS: u32 = 64;
@@ -137,35 +145,88 @@ fn place_in_block(around: &Surroundings<'_>, block: &Block) -> Option<Vec3> {
     best.map(|(_, place)| place)
 }
 
-/// A camera that sees what a light lights: along the longest level line through the light's place, from
-/// one end towards the other.
+/// A camera that shows what a light lights: of many places around it the one whose picture has most
+/// lit surfaces and edges. `None` when the light lights nothing.
 pub fn camera_at_light(around: &Surroundings<'_>, light: Vec3, aspect: f32) -> Option<Camera> {
     let limit = size(around.mesh);
     let below = around.distance(light, Vec3::NEG_Y, limit);
     let above = around.distance(light, Vec3::Y, limit);
-    // The height of eyes in a room of usual proportions.
-    let eye = light - Vec3::Y * (below - 0.45 * (below + above).min(2.0 * below)).max(0.0);
-    let mut best: Option<(f32, Vec3, f32, f32)> = None;
-    for k in 0..48 {
-        let angle = k as f32 / 48.0 * std::f32::consts::TAU;
-        let ahead = Vec3::new(angle.cos(), 0.0, angle.sin());
-        // A view out of the level shows nothing; standing outside and looking in is fine.
-        let Some(hit) = around.bvh.closest_hit(eye, ahead, limit) else {
-            continue;
-        };
-        let forward = hit.t;
-        let back = around.distance(eye, -ahead, limit);
-        // A place to stand in counts as much as a far view, but no more than fits into the picture.
-        let score = forward + 1.5 * back.min(forward);
-        if best.is_none_or(|(most, ..)| score > most) {
-            best = Some((score, ahead, forward, back));
+    let mut best: Option<(f32, Camera)> = None;
+    // Heights of eyes in rooms of usual proportions, and higher where the light hangs over a pit.
+    for height in [0.35, 0.6] {
+        let eye = light - Vec3::Y * (below - height * (below + above).min(1.4 * below)).max(0.0);
+        for k in 0..24 {
+            let angle = k as f32 / 24.0 * TAU;
+            let ahead = Vec3::new(angle.cos(), 0.0, angle.sin());
+            let back = around.distance(eye, -ahead, limit);
+            let forward = around.distance(eye, ahead, limit);
+            for share in [0.4, 0.85] {
+                // Standing outside and looking in is fine, but not from afar.
+                let from = eye - ahead * (share * back).min(1.5 * forward);
+                let to = eye + ahead * forward - Vec3::Y * 0.15 * (forward + back).min(below);
+                let Some(camera) = Camera::look_at(from, to, VIEW_ANGLE_RAD, aspect) else {
+                    continue;
+                };
+                let score = interest(around, &camera, light);
+                if score > 0.0 && best.is_none_or(|(most, _)| score > most) {
+                    best = Some((score, camera));
+                }
+            }
         }
     }
-    let (_, ahead, forward, back) = best?;
-    let from = eye - ahead * (0.85 * back).min(1.5 * forward);
-    // Slightly downwards: floors show light better than far ends.
-    let to = eye + ahead * forward - Vec3::Y * 0.1 * forward.min(0.9 * below);
-    Camera::look_at(from, to, 60f32.to_radians(), aspect)
+    best.map(|(_, camera)| camera)
+}
+
+/// What one ray of a trial picture meets.
+#[derive(Clone, Copy)]
+struct Glimpse {
+    distance: f32,
+    normal: Vec3,
+}
+
+/// How much there is to see: lit surfaces, and edges between surfaces; little of the outside and of
+/// things right before the camera. Zero inside a wall.
+fn interest(around: &Surroundings<'_>, camera: &Camera, light: Vec3) -> f32 {
+    let near = 0.25 * camera.position.distance(light);
+    let (mut lit, mut far) = (0.0, 0.0);
+    let mut glimpses = [None; TRIAL_COLUMNS * TRIAL_ROWS];
+    for (k, glimpse) in glimpses.iter_mut().enumerate() {
+        let x = ((k % TRIAL_COLUMNS) as f32 + 0.5) / TRIAL_COLUMNS as f32;
+        let y = ((k / TRIAL_COLUMNS) as f32 + 0.5) / TRIAL_ROWS as f32;
+        let direction = camera.direction(x, y);
+        let Some(hit) = around
+            .bvh
+            .closest_hit(camera.position, direction, f32::INFINITY)
+        else {
+            continue;
+        };
+        let [a, b, c] = around.mesh.corners(hit.triangle as usize);
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        if (normal.dot(direction) < 0.0) == around.is_reversed {
+            return 0.0;
+        }
+        let start = (camera.position + direction * hit.t).lerp(light, 1e-3);
+        lit += f32::from(!around.bvh.is_occluded(start, light - start, 1.0));
+        far += f32::from(hit.t > near);
+        *glimpse = Some(Glimpse {
+            distance: hit.t,
+            normal,
+        });
+    }
+    let is_edge = |k: usize, other: usize| match (glimpses[k], glimpses[other]) {
+        (Some(p), Some(q)) => {
+            let ratio = p.distance / q.distance;
+            p.normal.dot(q.normal) < 0.8 || !(0.75..1.33).contains(&ratio)
+        }
+        _ => false,
+    };
+    let edges = (0..glimpses.len() - TRIAL_COLUMNS)
+        .filter(|&k| (k + 1) % TRIAL_COLUMNS != 0)
+        .map(|k| f32::from(is_edge(k, k + 1)) + f32::from(is_edge(k, k + TRIAL_COLUMNS)))
+        .sum::<f32>();
+    let count = glimpses.len() as f32;
+    // Half lit and a quarter of edges is a full picture; more is no better.
+    (lit / count).min(0.5) * (edges / count).min(0.5) * (far / count).powi(2)
 }
 
 /// A camera high outside, to look into the rooms through the backs of ceilings.

@@ -4,7 +4,7 @@ use super::Picture;
 use glam::Vec3;
 
 /// Luminance that auto exposure brings the picture's middle to.
-const MIDDLE_GREY: f32 = 0.16;
+const MIDDLE_GREY: f32 = 0.2;
 
 /// Auto exposure lets at most this share of the pixels run into white.
 const WHITE_SHARE: f64 = 0.02;
@@ -13,6 +13,9 @@ const WHITE_SHARE: f64 = 0.02;
 pub fn luminance(colour: Vec3) -> f32 {
     colour.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
+
+/// Pixels darker than this share of the brightest count as unlit.
+const UNLIT_SHARE: f32 = 0.01;
 
 /// The factor that exposes a picture well: its middle becomes a middle grey, unless too much of it
 /// would turn white. Unlit pixels do not count; 1 for a picture without light.
@@ -27,9 +30,11 @@ pub fn auto_exposure(pictures: &[&Picture]) -> f32 {
         return 1.0;
     }
     lit.sort_by(f32::total_cmp);
-    let at = |share: f64| lit[((lit.len() - 1) as f64 * share) as usize];
-    // A value of 4 is white to the eye behind the shoulder of the curve.
-    let exposure = (MIDDLE_GREY / at(0.5)).min(4.0 / at(1.0 - WHITE_SHARE));
+    let at = |values: &[f32], share: f64| values[((values.len() - 1) as f64 * share) as usize];
+    let bright = at(&lit, 1.0 - WHITE_SHARE);
+    let dark = lit.partition_point(|&value| value < UNLIT_SHARE * bright);
+    // A value of 2 is nearly white behind the shoulder of the curve.
+    let exposure = (MIDDLE_GREY / at(&lit[dark..], 0.5)).min(2.0 / bright);
     exposure.clamp(1e-20, 1e20)
 }
 

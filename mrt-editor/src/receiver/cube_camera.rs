@@ -16,8 +16,9 @@ const SLACK: f64 = 1.08;
 /// Distances to the mesh through every pixel of the six faces, seen from the centre.
 #[derive(Clone, Debug)]
 pub struct CubeCamera {
+    warp: Hexahedron,
     center: DVec3,
-    /// In block widths of the unit cube's own directions; infinite where nothing is seen.
+    /// In lengths from the centre to the block's own face; infinite where nothing is seen.
     depth: Vec<f32>,
 }
 
@@ -30,18 +31,21 @@ impl CubeCamera {
             for j in 0..RESOLUTION {
                 for i in 0..RESOLUTION {
                     let target = warp.point(face.texel_center(RESOLUTION, j, i));
-                    // t is in lengths from the centre to the block's own face.
                     let direction = (target - center).as_vec3();
                     let hit = bvh.closest_hit(center.as_vec3(), direction, f32::INFINITY);
                     depth.push(hit.map_or(f32::INFINITY, |hit| hit.t));
                 }
             }
         }
-        Self { center, depth }
+        Self {
+            warp: *warp,
+            center,
+            depth,
+        }
     }
 
     /// The face through which the point of the unit cube is seen; `None` when something hides it.
-    pub fn face_that_sees(&self, warp: &Hexahedron, point: DVec3, unit: DVec3) -> Option<Face> {
+    pub fn face_that_sees(&self, point: DVec3, unit: DVec3) -> Option<Face> {
         let from_center = unit - 0.5;
         let size = from_center.abs();
         let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b]))?;
@@ -56,7 +60,7 @@ impl CubeCamera {
         };
         let (i, j) = (pixel(on_face[face.u_axis()]), pixel(on_face[face.v_axis()]));
         let seen = self.depth[(face.index() * RESOLUTION + j) * RESOLUTION + i];
-        let full = warp.point(on_face).distance(self.center);
+        let full = self.warp.point(on_face).distance(self.center);
         let distance = point.distance(self.center) / full;
         (distance <= f64::from(seen) * SLACK).then_some(face)
     }

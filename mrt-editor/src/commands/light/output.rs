@@ -104,10 +104,10 @@ fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
                     );
                     next
                 });
-            let (face, u, v) = lit.receivers.canonical(receiver);
+            let (u, v) = (receiver.u as f32, receiver.v as f32);
             let uv = lit
                 .atlas
-                .texture_coordinate(receiver.block, face, u as f32, v as f32)
+                .texture_coordinate(receiver.block, receiver.face, u, v)
                 .unwrap_or_default();
             let next = coordinates.len() + 1;
             let coordinate = *coordinates

@@ -1,0 +1,69 @@
+//! A coarse grid over the level; each cell lists every block that can be nearest to a point in it.
+
+use glam::DVec3;
+
+/// Cells along each axis.
+const CELLS: usize = 24;
+
+/// Boxes by place.
+#[derive(Clone, Debug)]
+pub struct Lookup {
+    min: DVec3,
+    edge: DVec3,
+    candidates: Vec<Vec<u32>>,
+}
+
+impl Lookup {
+    /// Sorts boxes, given by their smallest and largest corners, into the grid.
+    pub fn new(boxes: &[(DVec3, DVec3)]) -> Self {
+        let min = boxes.iter().map(|b| b.0).fold(DVec3::MAX, DVec3::min);
+        let max = boxes.iter().map(|b| b.1).fold(DVec3::MIN, DVec3::max);
+        // Meshes reach beyond the blocks; further out, the outermost cells serve.
+        let margin = (max - min) * 0.1;
+        let (min, max) = (min - margin, max + margin);
+        let edge = (max - min) / CELLS as f64;
+        let half = edge / 2.0;
+        let mut candidates = Vec::with_capacity(CELLS.pow(3));
+        for z in 0..CELLS {
+            for y in 0..CELLS {
+                for x in 0..CELLS {
+                    let center = min + (DVec3::new(x as f64, y as f64, z as f64) + 0.5) * edge;
+                    let nearest = boxes
+                        .iter()
+                        .map(|&bounds| box_distance(center, bounds))
+                        .fold(f64::MAX, f64::min);
+                    // The nearest box may hold a slanted block whose wall is further away.
+                    let reach = nearest + 2.0 * half.length();
+                    let is_near = |&(low, high): &(DVec3, DVec3)| {
+                        box_distance(center, (low - half, high + half)) <= reach
+                    };
+                    let near = boxes
+                        .iter()
+                        .enumerate()
+                        .filter(|(_, bounds)| is_near(bounds));
+                    candidates.push(near.map(|(index, _)| index as u32).collect());
+                }
+            }
+        }
+        Self {
+            min,
+            edge,
+            candidates,
+        }
+    }
+
+    /// Boxes to ask about a point.
+    pub fn candidates(&self, point: DVec3) -> &[u32] {
+        let cell = ((point - self.min) / self.edge)
+            .clamp(DVec3::ZERO, DVec3::splat(CELLS as f64 - 1.0))
+            .as_usizevec3();
+        self.candidates
+            .get((cell.z * CELLS + cell.y) * CELLS + cell.x)
+            .map_or(&[], Vec::as_slice)
+    }
+}
+
+/// Distance from a point to a box, zero inside.
+pub fn box_distance(point: DVec3, (min, max): (DVec3, DVec3)) -> f64 {
+    point.distance(point.clamp(min, max))
+}
