@@ -115,6 +115,15 @@ pub fn dropped_energy(singular_values: &[f64], kept: usize) -> f64 {
     if total > 0.0 { dropped / total } else { 0.0 }
 }
 
+/// [`dropped_energy`] of what lies beyond the first value, for spectra whose first mode is there by
+/// decree, as large as one likes, and would make every other share look small.
+pub fn dropped_energy_beyond_first(singular_values: &[f64], kept: usize) -> f64 {
+    dropped_energy(
+        singular_values.get(1..).unwrap_or(&[]),
+        kept.saturating_sub(1),
+    )
+}
+
 /// +1 or -1, the sign of the entry of largest magnitude.
 ///
 /// Entries within rounding of the largest tie, and the first of them decides: symmetric vectors have
@@ -197,5 +206,6 @@ mod tests {
         assert_eq!(energy_rank(&s, 9.0 / 14.0), 1);
         assert_eq!(energy_rank(&s, 0.9), 2);
         assert!((dropped_energy(&s, 2) - 1.0 / 14.0).abs() < 1e-15);
+        assert!((dropped_energy_beyond_first(&s, 2) - 1.0 / 5.0).abs() < 1e-15);
     }
 }

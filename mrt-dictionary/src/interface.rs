@@ -15,7 +15,7 @@ use mrt_core::cube::Face;
 use mrt_core::form_factor::point_to_polygon;
 use mrt_core::matrix::{Matrix, dot, multiply, transpose_multiply};
 use mrt_core::parity::ParityClasses;
-use mrt_core::svd::{dropped_energy, largest_entry_sign, svd, symmetric_eigen};
+use mrt_core::svd::{dropped_energy_beyond_first, largest_entry_sign, svd, symmetric_eigen};
 use mrt_runtime::shape::Shape;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -29,7 +29,7 @@ pub struct LightfieldBasis {
     pub scales: Vec<f64>,
     /// Parity class of each vector: bit 0 set if odd in u, bit 1 if odd in v.
     pub classes: Vec<usize>,
-    /// Fraction of the energy of the decomposed lightfields beyond the modes kept.
+    /// Fraction that the modes left out hold of the lightfields' energy beyond their first mode.
     pub dropped_energy: f64,
 }
 
@@ -48,7 +48,7 @@ pub struct InterfaceOperators {
     pub response_basis: Matrix<f64>,
     /// Singular values of the response.
     pub response_singular_values: Vec<f64>,
-    /// Fraction of the response's energy beyond the modes kept.
+    /// Fraction that the modes left out hold of the response's energy beyond its first mode.
     pub dropped_energy: f64,
 }
 
@@ -176,7 +176,7 @@ pub fn lightfield_basis(
         vectors: Matrix::from_columns(classes.point_count(), &vectors),
         scales: all[..kept].to_vec(),
         classes: found[..kept].iter().map(|mode| mode.class).collect(),
-        dropped_energy: dropped_energy(&all, kept),
+        dropped_energy: dropped_energy_beyond_first(&all, kept),
     })
 }
 
@@ -341,7 +341,7 @@ pub fn interface_operators(
         right,
         response_from_lightfield: transpose_multiply(response_basis.view(), response.view()),
         response_basis,
-        dropped_energy: dropped_energy(&response_singular_values, kept),
+        dropped_energy: dropped_energy_beyond_first(&response_singular_values, kept),
         response_singular_values,
     })
 }

@@ -9,7 +9,7 @@
 use crate::prior::ScaledBasis;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::parity::ParityClasses;
-use mrt_core::svd::{dropped_energy, svd};
+use mrt_core::svd::{dropped_energy_beyond_first, svd};
 
 /// Singular values closer than this, relatively, belong to one multiplet of the shape's symmetry, and a
 /// cut never separates them: which vectors of a multiplet come first is a matter of rounding.
@@ -26,7 +26,7 @@ pub struct BlockTransport {
     pub implicit_lighting: Matrix<f64>,
     /// All singular values of M, largest first; the first `modes` belong to the columns.
     pub singular_values: Vec<f64>,
-    /// Fraction of M's energy beyond the modes kept.
+    /// Fraction that the modes left out hold of M's energy beyond its first mode, which is uniform light.
     pub dropped_energy: f64,
 }
 
@@ -102,7 +102,7 @@ pub fn block_transport(
         indirect_basis: Matrix::from_columns(texels, &indirect_columns),
         coefficients_from_direct: Matrix::from_columns(texels, &coefficient_rows).transposed(),
         implicit_lighting: Matrix::from_columns(texels, &implicit_columns),
-        dropped_energy: dropped_energy(&singular_values, kept),
+        dropped_energy: dropped_energy_beyond_first(&singular_values, kept),
         singular_values,
     }
 }

@@ -33,7 +33,8 @@ pub struct ShapeOperators {
     pub lightfield_from_coefficients: Vec<Matrix<f32>>,
     /// Singular values of the modes, largest first.
     pub singular_values: Vec<f32>,
-    /// Fraction of the energy of M that the modes left out hold.
+    /// Fraction that the modes left out hold of M's energy beyond its first mode (uniform light, whose size
+    /// the enrichment sets).
     pub dropped_energy: f32,
 }
 
@@ -50,9 +51,10 @@ pub struct InterfaceOperators {
     pub response_from_lightfield: Matrix<f32>,
     /// `U_r`, texels x response modes, on the five walls of the cube open at -z.
     pub response_basis: Matrix<f32>,
-    /// Fraction of the emitted and propagated lightfields' energy that the lightfield modes leave out.
+    /// Fraction that the modes left out hold of the emitted and propagated lightfields' energy beyond their
+    /// first mode.
     pub lightfield_dropped_energy: f32,
-    /// Fraction of the response's energy that the response modes leave out.
+    /// Fraction that the modes left out hold of the response's energy beyond its first mode.
     pub response_dropped_energy: f32,
 }
 
