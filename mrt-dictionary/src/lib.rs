@@ -4,14 +4,14 @@
 //! light [`prior`], and the reduced [`transport`]. For all together: [`lightfield`]s at the openings and the
 //! [`interface`] operators between them. [`bake`] is that list of calls.
 
-pub mod bake;
+pub mod config;
+pub mod progress;
+pub mod symmetry;
 pub mod bounce;
 pub mod bounce_rays;
-pub mod config;
-pub mod interface;
-pub mod lightfield;
 pub mod prior;
-pub mod progress;
-pub mod spectrum;
-pub mod symmetry;
 pub mod transport;
+pub mod lightfield;
+pub mod interface;
+pub mod bake;
+pub mod spectrum;

@@ -98,13 +98,12 @@ impl<'a> LevelView<'a> {
         })
     }
 
-    /// Radiance towards the ray's origin, W/(m² sr) per channel: from direct and from indirect light.
-    pub fn radiance(&self, mut origin: Vec3, direction: Vec3) -> (Vec3, Vec3) {
+    /// Radiance towards the ray's origin, W/(m² sr) per channel, from direct and from indirect light;
+    /// `None` where the ray meets no wall from inside.
+    pub fn radiance(&self, mut origin: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
         // A ray crosses each block at most twice.
         for _ in 0..2 * self.scene.blocks.len() + 2 {
-            let Some(hit) = self.bvh.closest_hit(origin, direction, f32::MAX) else {
-                break;
-            };
+            let hit = self.bvh.closest_hit(origin, direction, f32::MAX)?;
             let patch = &self.triangles[hit.triangle as usize];
             let [a, b, c] = patch.corners;
             let mix = |k: usize| a[k] + hit.u * (b[k] - a[k]) + hit.v * (c[k] - a[k]);
@@ -114,11 +113,11 @@ impl<'a> LevelView<'a> {
                 .warp
                 .face_normal(patch.face, f64::from(u), f64::from(v));
             if normal.dot(direction.as_dvec3()) < 0.0 {
-                return self.leaving(patch, u, v, normal);
+                return Some(self.leaving(patch, u, v, normal));
             }
             origin += direction * (hit.t + RESTART);
         }
-        (Vec3::ZERO, Vec3::ZERO)
+        None
     }
 
     fn leaving(&self, patch: &Patch, u: f32, v: f32, normal: DVec3) -> (Vec3, Vec3) {

@@ -46,6 +46,19 @@ const LEAST_FACING: f64 = 0.35;
 /// parallel to, and where that is an opening, the walls around it share.
 const BLEND_OFFSET: f64 = 0.15;
 
+/// Blocks that are not joined but have nothing between them, such as storeys around an atrium, run into
+/// one another over this distance, in block widths.
+const BLEND_DISTANCE: f64 = 0.4;
+
+/// Blocks that one point takes light from, at most.
+const MOST_BLENDED: usize = 4;
+
+/// Distances over which light ends on surfaces that have their block behind them, in block widths.
+const BEHIND_RANGE: [f64; 2] = [0.1, 0.3];
+
+/// Distances over which light ends on surfaces away from any block, in block widths.
+const FAR_RANGE: [f64; 2] = [0.6, 1.2];
+
 /// Blocks by place.
 #[derive(Clone, Debug)]
 pub struct ReceiverMap {
@@ -62,18 +75,47 @@ struct Placed {
     map: Trilinear,
     orientation: CubeRotation,
     bounds: (DVec3, DVec3),
+    /// Cube root of the volume, metres.
+    width: f64,
     /// Of the canonical shape.
     is_wall: [bool; 6],
+    /// Blocks that it is connected to.
+    neighbours: Vec<usize>,
+}
+
+/// The block nearest to a place.
+#[derive(Clone, Copy, Debug)]
+struct Found {
+    block: usize,
+    /// In its unit cube.
+    unit: DVec3,
+    /// Where it was looked for.
+    place: DVec3,
+    /// Metres from the place to the block, 0 inside.
+    distance: f64,
+}
+
+/// Receivers of one point, with weights.
+#[derive(Clone, Copy, Debug)]
+pub struct Blend {
+    parts: [(Receiver, f64); 6 * MOST_BLENDED],
+    count: usize,
 }
 
 impl ReceiverMap {
     /// Sorts the level's blocks by place.
     pub fn new(level: &Level) -> Self {
-        let blocks: Vec<Placed> = level.blocks.iter().map(Placed::new).collect();
+        let mut blocks: Vec<Placed> = level.blocks.iter().map(Placed::new).collect();
+        for connection in &level.connections {
+            let (a, b) = (connection.a.block, connection.b.block);
+            blocks[a].neighbours.push(b);
+            blocks[b].neighbours.push(a);
+        }
+        let widest = blocks.iter().map(|block| block.width).fold(0.0, f64::max);
         let bounds: Vec<_> = blocks.iter().map(|block| block.bounds).collect();
         let diagonals = || level.blocks.iter().map(|block| block.warp.diagonal());
         Self {
-            lookup: Lookup::new(&bounds),
+            lookup: Lookup::new(&bounds, BLEND_DISTANCE * widest),
             blocks,
             camera: None,
             smallest_diagonal: diagonals().fold(f64::MAX, f64::min),
@@ -96,7 +138,7 @@ impl ReceiverMap {
     /// blocks.
     pub fn receiver(&self, point: Vec3, normal: Vec3) -> Option<Receiver> {
         let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
-        let (block, unit) = self.block_in_front(point, normal)?;
+        let Found { block, unit, .. } = self.block_in_front(point, normal)?;
         let placed = &self.blocks[block];
         let facing = placed.facing(unit, normal);
         let face = self.face_seen(point, unit, &facing).or_else(|| {
@@ -108,28 +150,70 @@ impl ReceiverMap {
         Some(on_face(block, face, unit))
     }
 
-    /// The receivers of a surface point and their weights, which sum to one and change smoothly with the
-    /// normal; for pictures, where each pixel can read several places of a lightmap.
-    pub fn blended(&self, point: Vec3, normal: Vec3) -> [Option<(Receiver, f64)>; 6] {
+    /// The receivers of a surface point and their weights, which change smoothly with place and normal;
+    /// for pictures, where each pixel can read several places of a lightmap. `sees` tells whether
+    /// nothing stands between the surface and a point.
+    ///
+    /// The weights sum to one, less where the nearest block lies behind the surface or far off: no
+    /// light of the level gets there.
+    pub fn blended(&self, point: Vec3, normal: Vec3, sees: impl Fn(Vec3) -> bool) -> Blend {
+        let mut blend = Blend::default();
         let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
-        let mut receivers = [None; 6];
-        let Some((block, unit)) = self.block_in_front(point, normal) else {
-            return receivers;
+        let Some(own) = self.block_in_front(point, normal) else {
+            return blend;
         };
+        let placed = &self.blocks[own.block];
+        let share = placed.share_lit(point, normal, &own);
+        if let Some(face) = self.face_seen(point, own.unit, &placed.facing(own.unit, normal)) {
+            blend.add(on_face(own.block, face, own.unit), share);
+            return blend;
+        }
+        let mut blocks = [(own.block, own.unit, 1.0); MOST_BLENDED];
+        let mut count = 1;
+        for &other in self.lookup.candidates(own.place) {
+            let other = other as usize;
+            if count == MOST_BLENDED || self.is_continuous(own.block, other) {
+                continue;
+            }
+            let placed = &self.blocks[other];
+            let reach = own.distance + BLEND_DISTANCE * placed.width;
+            if lookup::box_distance(own.place, placed.bounds) >= reach {
+                continue;
+            }
+            let unit = placed.unit(own.place);
+            let beyond = placed.map.point(unit).distance(own.place) - own.distance;
+            let weight = (1.0 - beyond / (BLEND_DISTANCE * placed.width)).clamp(0.0, 1.0);
+            let inside = placed.map.point(unit.lerp(DVec3::splat(0.5), 0.1));
+            if weight > 0.0 && sees(inside.as_vec3()) {
+                blocks[count] = (other, placed.unit_from(unit, point), weight * weight);
+                count += 1;
+            }
+        }
+        let total: f64 = blocks[..count].iter().map(|(.., weight)| weight).sum();
+        for &(block, unit, weight) in &blocks[..count] {
+            self.blend_walls(block, unit, normal, share * weight / total, &mut blend);
+        }
+        blend
+    }
+
+    /// Shares a weight out over a block's walls.
+    fn blend_walls(&self, block: usize, unit: DVec3, normal: DVec3, share: f64, blend: &mut Blend) {
         let placed = &self.blocks[block];
         let facing = placed.facing(unit, normal);
-        if let Some(face) = self.face_seen(point, unit, &facing) {
-            receivers[0] = Some((on_face(block, face, unit), 1.0));
-            return receivers;
-        }
         let weight = |face: Face| (facing[face.index()] + BLEND_OFFSET).max(0.0).powi(3);
         let total: f64 = placed.walls().map(weight).sum();
         for face in placed.walls() {
-            if total > 0.0 && weight(face) > 0.0 {
-                receivers[face.index()] = Some((on_face(block, face, unit), weight(face) / total));
+            if weight(face) > 0.0 {
+                blend.add(on_face(block, face, unit), share * weight(face) / total);
             }
         }
-        receivers
+    }
+
+    /// True for a block itself and those whose walls run on into its walls.
+    fn is_continuous(&self, block: usize, other: usize) -> bool {
+        let joined = |a: usize, b: usize| self.blocks[a].neighbours.contains(&b);
+        let around = &self.blocks[block].neighbours;
+        block == other || joined(block, other) || around.iter().any(|&b| joined(b, other))
     }
 
     /// Where a point lies on a wall of a block, moved inside it.
@@ -139,8 +223,8 @@ impl ReceiverMap {
 
     /// The block that contains a point, or else the nearest, and the distance to it in metres.
     pub fn nearest_block(&self, point: Vec3) -> Option<(usize, f64)> {
-        let (block, _, distance) = self.nearest(point.as_dvec3())?;
-        Some((block, distance))
+        let found = self.nearest(point.as_dvec3())?;
+        Some((found.block, found.distance))
     }
 
     /// A canonical face as the level names it.
@@ -154,44 +238,81 @@ impl ReceiverMap {
         (facing[face.index()] > LEAST_FACING).then_some(face)
     }
 
-    /// The block that the surface looks into, with the point's place in its unit cube.
-    fn block_in_front(&self, point: DVec3, normal: DVec3) -> Option<(usize, DVec3)> {
-        let mut nearest: Option<(usize, DVec3, f64)> = None;
+    /// The block that the surface looks into.
+    fn block_in_front(&self, point: DVec3, normal: DVec3) -> Option<Found> {
+        let mut nearest: Option<Found> = None;
         for step in STEPS_OFF_SURFACE {
-            let place = point + normal * step * self.smallest_diagonal;
-            let found = self.nearest(place)?;
-            if nearest.is_none_or(|(.., least)| found.2 < least) {
+            let found = self.nearest(point + normal * step * self.smallest_diagonal)?;
+            let is_inside = found.distance == 0.0;
+            if nearest.is_none_or(|nearest| found.distance < nearest.distance) {
                 nearest = Some(found);
             }
-            if found.2 == 0.0 {
+            if is_inside {
                 break;
             }
         }
-        let (block, unit, _) = nearest?;
-        Some((block, self.blocks[block].unit_from(unit, point)))
+        let mut found = nearest?;
+        found.unit = self.blocks[found.block].unit_from(found.unit, point);
+        Some(found)
     }
 
-    fn nearest(&self, point: DVec3) -> Option<(usize, DVec3, f64)> {
-        let mut best: Option<(usize, DVec3, f64)> = None;
+    fn nearest(&self, place: DVec3) -> Option<Found> {
+        let mut best: Option<Found> = None;
         // Tolerance of the inverse map, in metres.
         let rounding = 2e-6 * self.largest_diagonal;
-        for &block in self.lookup.candidates(point) {
+        for &block in self.lookup.candidates(place) {
             let placed = &self.blocks[block as usize];
-            let least = best.map_or(f64::MAX, |(_, _, least)| least);
-            if lookup::box_distance(point, placed.bounds) >= least {
+            let least = best.map_or(f64::MAX, |best| best.distance);
+            if lookup::box_distance(place, placed.bounds) >= least {
                 continue;
             }
-            let unit = placed.unit(point);
-            let distance = placed.map.point(unit).distance(point);
+            let unit = placed.unit(place);
+            let distance = placed.map.point(unit).distance(place);
             let distance = if distance < rounding { 0.0 } else { distance };
             if distance < least {
-                best = Some((block as usize, unit, distance));
+                best = Some(Found {
+                    block: block as usize,
+                    unit,
+                    place,
+                    distance,
+                });
             }
             if distance == 0.0 {
                 break;
             }
         }
         best
+    }
+}
+
+impl Blend {
+    /// Receivers and their weights.
+    pub fn parts(&self) -> &[(Receiver, f64)] {
+        &self.parts[..self.count]
+    }
+
+    fn add(&mut self, receiver: Receiver, weight: f64) {
+        if weight > 0.0
+            && let Some(part) = self.parts.get_mut(self.count)
+        {
+            *part = (receiver, weight);
+            self.count += 1;
+        }
+    }
+}
+
+impl Default for Blend {
+    fn default() -> Self {
+        let nowhere = Receiver {
+            block: 0,
+            face: Face::NegX,
+            u: 0.0,
+            v: 0.0,
+        };
+        Self {
+            parts: [(nowhere, 0.0); 6 * MOST_BLENDED],
+            count: 0,
+        }
     }
 }
 
@@ -202,6 +323,8 @@ impl Placed {
             map: Trilinear::new(&warp),
             orientation: block.orientation,
             bounds: warp.bounds(),
+            width: warp.jacobian(DVec3::splat(0.5)).determinant().abs().cbrt(),
+            neighbours: Vec::new(),
             is_wall: Face::ALL.map(|face| !block.shape.is_open(face)),
         }
     }
@@ -220,6 +343,17 @@ impl Placed {
             let cosine = along[face.axis()];
             if face.is_positive() { -cosine } else { cosine }
         })
+    }
+
+    /// 1 for surfaces in the block or in niches before it, 0 for those that turn their back on it or are
+    /// far off.
+    fn share_lit(&self, point: DVec3, normal: DVec3, found: &Found) -> f64 {
+        let offset = point - self.map.point(found.unit);
+        let fade = |distance: f64, range: [f64; 2]| {
+            let [start, end] = range.map(|share| share * self.width);
+            (1.0 - (distance - start) / (end - start)).clamp(0.0, 1.0)
+        };
+        fade(offset.dot(normal), BEHIND_RANGE) * fade(offset.length(), FAR_RANGE)
     }
 
     /// The point's place in the unit cube, moved inside it.
@@ -300,13 +434,43 @@ mod tests {
             let normal = Vec3::new(angle.cos(), 0.3 * (3.0 * angle).sin(), angle.sin()).normalize();
             let point = Vec3::new(1.5, 0.4, 0.5);
             let one = map.receiver(point, normal).expect("blocks");
-            let parts: Vec<_> = map.blended(point, normal).into_iter().flatten().collect();
+            let blend = map.blended(point, normal, |_| true);
+            let parts = blend.parts();
             let total: f64 = parts.iter().map(|(_, weight)| weight).sum();
             assert!((total - 1.0).abs() < 1e-12);
             for receiver in parts.iter().map(|(part, _)| part).chain([&one]) {
                 assert!(!level.blocks[receiver.block].shape.is_open(receiver.face));
             }
         }
+    }
+
+    #[test]
+    fn light_does_not_reach_the_backs_of_walls() {
+        let map = ReceiverMap::new(&corridor());
+        let weight = |normal| {
+            let blend = map.blended(Vec3::new(0.5, -0.35, 0.5), normal, |_| true);
+            blend.parts().iter().map(|(_, weight)| weight).sum::<f64>()
+        };
+        assert_eq!(weight(Vec3::NEG_Y), 0.0);
+        assert!((weight(Vec3::Y) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn unjoined_blocks_run_into_one_another_unless_something_is_between() {
+        let mut level = corridor();
+        let upper = Level::from_cells(&[[0, 1, 0]], Vec3::ONE).expect("a cell");
+        level.blocks.extend(upper.blocks);
+        let map = ReceiverMap::new(&level);
+        let share_of_upper = |height: f32, sees: bool| {
+            let blend = map.blended(Vec3::new(0.0, height, 0.5), Vec3::X, |_| sees);
+            let of_upper = blend.parts().iter().filter(|(r, _)| r.block == 4);
+            of_upper.map(|(_, weight)| weight).sum::<f64>()
+        };
+        assert_eq!(share_of_upper(0.5, true), 0.0);
+        assert!((share_of_upper(0.999, true) - 0.5).abs() < 0.01);
+        assert!((share_of_upper(1.001, true) - 0.5).abs() < 0.01);
+        assert_eq!(share_of_upper(0.999, false), 0.0);
+        assert_eq!(share_of_upper(1.001, false), 1.0);
     }
 
     #[test]

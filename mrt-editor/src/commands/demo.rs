@@ -4,8 +4,8 @@ use crate::dictionary_source::{SourceError, load};
 use crate::level_view::{LevelView, ViewError};
 use crate::picture::camera::Camera;
 use crate::picture::file::{WriteError, write_png};
-use crate::picture::render;
 use crate::picture::tone::{auto_exposure, tone_map};
+use crate::picture::{Picture, render};
 use crate::reference_level::{LevelErrors, ReferenceLevelError, measure};
 use crate::table::Table;
 use glam::Vec3;
@@ -26,6 +26,9 @@ pub const MAZE: &str = include_str!("../../../assets/maze.level.toml");
 
 /// Frames over which stage times are taken; the fastest counts, since other programs only slow them.
 const TIMED_FRAMES: usize = 20;
+
+/// sRGB outside the level.
+const BACKGROUND: [u8; 3] = [58, 62, 70];
 
 /// Bounces in pictures and in the second row of errors.
 const BOUNCES: u32 = 8;
@@ -237,7 +240,7 @@ fn take_pictures(
     let first = &scene.blocks[0].warp;
     let size = first.diagonal() as f32 / 3f32.sqrt();
     let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
-    let from_above = middle + Vec3::new(0.0, 1.15 * extent, 0.75 * extent);
+    let from_above = middle + Vec3::new(0.0, 1.0 * extent, 0.6 * extent);
     let eye = scene.blocks[0]
         .warp
         .point(glam::DVec3::new(0.06, 0.5, 0.5))
@@ -263,19 +266,33 @@ fn take_pictures(
         let Some(camera) = Camera::look_at(from, to, angle, width as f32 / height as f32) else {
             continue;
         };
-        let pictures = render(&camera, [width, height], 2, |origin, direction| {
-            let (direct, indirect) = shown.radiance(origin, direction);
-            [direct, indirect, direct + indirect]
-        });
+        let [direct, indirect, both, coverage] =
+            render(&camera, [width, height], 2, |origin, direction| match shown
+                .radiance(origin, direction)
+            {
+                Some((direct, indirect)) => [direct, indirect, direct + indirect, Vec3::ONE],
+                None => [Vec3::ZERO; 4],
+            });
         // One exposure for the three, so that they can be compared.
-        let exposure = auto_exposure(&[&pictures[2]]);
-        for (picture, part) in pictures.iter().zip(["direct", "indirect", "both"]) {
+        let exposure = auto_exposure(&[&both]);
+        for (picture, part) in [(direct, "direct"), (indirect, "indirect"), (both, "both")] {
             let path = args.out.join(format!("{name}-{part}.png"));
-            write_png(&path, [width, height], &tone_map(picture, exposure))?;
+            let mut srgb = tone_map(&picture, exposure);
+            over_background(&mut srgb, &coverage);
+            write_png(&path, [width, height], &srgb)?;
             written.push(path.display().to_string());
         }
     }
     Ok(written)
+}
+
+/// Shows the outside of the level as a plain grey, which no exposure changes.
+fn over_background(srgb: &mut [u8], coverage: &Picture) {
+    for (pixel, coverage) in srgb.as_chunks_mut::<3>().0.iter_mut().zip(&coverage.pixels) {
+        for (value, background) in pixel.iter_mut().zip(BACKGROUND) {
+            *value = value.saturating_add((f32::from(background) * (1.0 - coverage.x)) as u8);
+        }
+    }
 }
 
 fn milliseconds(duration: std::time::Duration) -> f64 {

@@ -198,7 +198,8 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
         atlas: &scene.atlas,
         lightmap: frame.lightmap(),
         lights: &lights,
-        hides_backs: false,
+        restart: surroundings.restart(),
+        hides_outside: false,
     };
     let views = views(args, &lit, &level, &surroundings)?;
     let unwrapped = crate::receiver::unwrap::unwrap(mesh, &receivers);
@@ -398,7 +399,7 @@ fn views(
         .into_iter()
         .map(|(name, camera, is_outside)| {
             let lit = LitScene {
-                hides_backs: is_outside && !surroundings.is_reversed,
+                hides_outside: is_outside && !surroundings.is_reversed,
                 ..*lit
             };
             let [direct, indirect] = render(&camera, args.size, 2, |origin, direction| {

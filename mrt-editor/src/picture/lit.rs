@@ -1,6 +1,6 @@
 //! Colours of a mesh under sphere lights, with indirect light from a lightmap.
 
-use crate::receiver::ReceiverMap;
+use crate::receiver::{Blend, ReceiverMap};
 use glam::Vec3;
 use mrt_core::bvh::Bvh;
 use mrt_core::mesh::TriangleMesh;
@@ -42,8 +42,11 @@ pub struct LitScene<'a> {
     pub lightmap: &'a [[f32; 3]],
     /// Lights, for the direct part.
     pub lights: &'a [SphereLight],
-    /// Surfaces are invisible from behind, so that a view from outside looks into the rooms.
-    pub hides_backs: bool,
+    /// Length that rays start off surfaces, metres.
+    pub restart: f32,
+    /// For views from outside: surfaces are invisible from behind and where no light of the level gets
+    /// to, such as roofs, so that one looks into the rooms.
+    pub hides_outside: bool,
 }
 
 /// What a ray sees.
@@ -86,8 +89,8 @@ impl LitScene<'_> {
             let flat = (b - a).cross(c - a).normalize_or_zero();
             let position = origin + direction * hit.t;
             let is_back = flat.dot(direction) > 0.0;
-            if is_back && self.hides_backs {
-                origin = position + direction * (1e-4 * hit.t.max(1e-2));
+            if self.hides_outside && (is_back || self.is_outside(position, flat)) {
+                origin = position + direction * self.restart;
                 continue;
             }
             let towards_viewer = if is_back { -1.0 } else { 1.0 };
@@ -102,6 +105,12 @@ impl LitScene<'_> {
             });
         }
         None
+    }
+
+    fn is_outside(&self, position: Vec3, normal: Vec3) -> bool {
+        let blend = self.receivers.blended(position, normal, |_| false);
+        let lit: f64 = blend.parts().iter().map(|(_, weight)| weight).sum();
+        lit < 0.5
     }
 
     /// Irradiance straight from the lights, with soft shadows.
@@ -124,7 +133,7 @@ impl LitScene<'_> {
     /// Share of a light that is seen: two rays where they agree, more in penumbras.
     fn visible_share(&self, surface: &Surface, light: &SphereLight, seed: u32) -> f32 {
         let distance = light.position.distance(surface.position);
-        let start = surface.position + surface.flat_normal * (1e-4 * distance);
+        let start = surface.position + surface.flat_normal * self.restart.min(1e-2 * distance);
         let is_visible = |k: u32| {
             let square = square_from_unit(sobol_point(k, seed));
             let on_light = sphere_from_square(square).as_vec3() * light.radius;
@@ -139,17 +148,24 @@ impl LitScene<'_> {
         (first + rest) as f32 / SHADOW_RAYS as f32
     }
 
+    fn blend(&self, surface: &Surface) -> Blend {
+        let start = surface.position + surface.flat_normal * self.restart;
+        self.receivers
+            .blended(surface.position, surface.normal, |place| {
+                !self.bvh.is_occluded(start, place - start, 1.0)
+            })
+    }
+
     /// Irradiance from the lightmap: one wall would do, but curved surfaces would show where it changes.
     fn indirect(&self, surface: &Surface) -> Vec3 {
-        let parts = self.receivers.blended(surface.position, surface.normal);
-        parts
-            .into_iter()
-            .flatten()
+        self.blend(surface)
+            .parts()
+            .iter()
             .filter_map(|(receiver, weight)| {
                 let (u, v) = (receiver.u as f32, receiver.v as f32);
                 let pixel = self.atlas.pixel(receiver.block, receiver.face, u, v)?;
                 let irradiance = self.atlas.sample(self.lightmap, pixel);
-                Some(Vec3::from_array(irradiance) * weight as f32)
+                Some(Vec3::from_array(irradiance) * *weight as f32)
             })
             .sum()
     }

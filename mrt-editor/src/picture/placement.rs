@@ -83,6 +83,11 @@ impl<'a> Surroundings<'a> {
         view
     }
 
+    /// Length to start rays off surfaces: a thousandth of what a person would call near.
+    pub fn restart(&self) -> f32 {
+        1e-5 * size(self.mesh)
+    }
+
     /// True behind the faces: in a wall or in the rock.
     pub fn is_in_wall(&self, point: Vec3) -> bool {
         let view = self.look_around(point);
@@ -187,7 +192,7 @@ struct Glimpse {
 /// How much there is to see: lit surfaces, and edges between surfaces; little of the outside and of
 /// things right before the camera. Zero inside a wall.
 fn interest(around: &Surroundings<'_>, camera: &Camera, light: Vec3) -> f32 {
-    let near = 0.25 * camera.position.distance(light);
+    let near = 0.4 * camera.position.distance(light);
     let (mut lit, mut far) = (0.0, 0.0);
     let mut glimpses = [None; TRIAL_COLUMNS * TRIAL_ROWS];
     for (k, glimpse) in glimpses.iter_mut().enumerate() {
@@ -226,7 +231,7 @@ fn interest(around: &Surroundings<'_>, camera: &Camera, light: Vec3) -> f32 {
         .sum::<f32>();
     let count = glimpses.len() as f32;
     // Half lit and a quarter of edges is a full picture; more is no better.
-    (lit / count).min(0.5) * (edges / count).min(0.5) * (far / count).powi(2)
+    (lit / count).min(0.5) * (edges / count).min(0.5) * (far / count).powi(3)
 }
 
 /// A camera high outside, to look into the rooms through the backs of ceilings.

@@ -1,4 +1,5 @@
-//! A coarse grid over the level; each cell lists every block that can be nearest to a point in it.
+//! A coarse grid over the level; each cell lists the blocks that matter to points in it,
+//! nearest first.
 
 use glam::DVec3;
 
@@ -14,13 +15,14 @@ pub struct Lookup {
 }
 
 impl Lookup {
-    /// Sorts boxes, given by their smallest and largest corners, into the grid.
-    pub fn new(boxes: &[(DVec3, DVec3)]) -> Self {
+    /// Sorts boxes, given by their smallest and largest corners, into the grid; a cell gets every box that
+    /// can be nearest to a point in it, or at most `margin` further than the nearest.
+    pub fn new(boxes: &[(DVec3, DVec3)], margin: f64) -> Self {
         let min = boxes.iter().map(|b| b.0).fold(DVec3::MAX, DVec3::min);
         let max = boxes.iter().map(|b| b.1).fold(DVec3::MIN, DVec3::max);
         // Meshes reach beyond the blocks; further out, the outermost cells serve.
-        let margin = (max - min) * 0.1;
-        let (min, max) = (min - margin, max + margin);
+        let around = (max - min) * 0.1;
+        let (min, max) = (min - around, max + around);
         let edge = (max - min) / CELLS as f64;
         let half = edge / 2.0;
         let mut candidates = Vec::with_capacity(CELLS.pow(3));
@@ -33,15 +35,17 @@ impl Lookup {
                         .map(|&bounds| box_distance(center, bounds))
                         .fold(f64::MAX, f64::min);
                     // The nearest box may hold a slanted block whose wall is further away.
-                    let reach = nearest + 2.0 * half.length();
-                    let is_near = |&(low, high): &(DVec3, DVec3)| {
-                        box_distance(center, (low - half, high + half)) <= reach
-                    };
-                    let near = boxes
+                    let reach = nearest + 2.0 * half.length() + margin;
+                    let mut near: Vec<(f64, u32)> = boxes
                         .iter()
                         .enumerate()
-                        .filter(|(_, bounds)| is_near(bounds));
-                    candidates.push(near.map(|(index, _)| index as u32).collect());
+                        .filter(|&(_, &(low, high))| {
+                            box_distance(center, (low - half, high + half)) <= reach
+                        })
+                        .map(|(index, &bounds)| (box_distance(center, bounds), index as u32))
+                        .collect();
+                    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+                    candidates.push(near.into_iter().map(|(_, index)| index).collect());
                 }
             }
         }
