@@ -250,3 +250,211 @@ fn from_level(level: Level) -> Mapped {
 fn closed_shape() -> &'static Shape {
     &mrt_runtime::shape::SHAPES[0]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mrt_core::cube::Face;
+    use std::collections::HashSet;
+
+    /// The walls around unit cells of free space, seen from inside.
+    fn rooms(free: &[[std::ops::Range<i32>; 3]]) -> TriangleMesh {
+        let cells: HashSet<[i32; 3]> = free
+            .iter()
+            .flat_map(|[xs, ys, zs]| {
+                let (ys, zs) = (ys.clone(), zs.clone());
+                xs.clone().flat_map(move |x| {
+                    let zs = zs.clone();
+                    ys.clone()
+                        .flat_map(move |y| zs.clone().map(move |z| [x, y, z]))
+                })
+            })
+            .collect();
+        let mut cells: Vec<_> = cells.iter().copied().collect();
+        cells.sort();
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for &cell in &cells {
+            for face in Face::ALL {
+                let step = face.outward().as_ivec3().to_array();
+                let next = std::array::from_fn(|axis| cell[axis] + step[axis]);
+                if cells.binary_search(&next).is_ok() {
+                    continue;
+                }
+                let corner = Vec3::from_array(cell.map(|c| c as f32));
+                let quad = face
+                    .rectangle([0.0, 1.0], [0.0, 1.0])
+                    .map(|p| corner + p.as_vec3());
+                let first = positions.len() as u32;
+                positions.extend(quad);
+                let inward = (quad[1] - quad[0]).cross(quad[2] - quad[0]).as_dvec3();
+                let [a, b, c, d] = if inward.dot(face.outward()) < 0.0 {
+                    [0, 1, 2, 3]
+                } else {
+                    [0, 3, 2, 1]
+                };
+                triangles.push([first + a, first + b, first + c]);
+                triangles.push([first + a, first + c, first + d]);
+            }
+        }
+        TriangleMesh::from_triangles(positions, triangles)
+    }
+
+    fn map(mesh: &TriangleMesh, cell: f64) -> Mapped {
+        let config = MapConfig {
+            cell: Some(cell),
+            ..MapConfig::default()
+        };
+        map_mesh(mesh, &config).expect("a level")
+    }
+
+    /// Number of blocks reached from the first through connections.
+    fn reached(level: &Level) -> usize {
+        let mut found = vec![0];
+        let mut k = 0;
+        while k < found.len() {
+            for connection in &level.connections {
+                let (a, b) = (connection.a.block, connection.b.block);
+                for (from, to) in [(a, b), (b, a)] {
+                    if from == found[k] && !found.contains(&to) {
+                        found.push(to);
+                    }
+                }
+            }
+            k += 1;
+        }
+        found.len()
+    }
+
+    #[test]
+    fn a_box_room_is_one_closed_block_with_its_bounds() {
+        let mesh = rooms(&[[0..4, 0..3, 0..4]]);
+        let mapped = map(&mesh, 4.0);
+        assert_eq!(mapped.level.blocks.len(), 1);
+        let block = &mapped.level.blocks[0];
+        assert_eq!(block.shape.name, "closed");
+        let (min, max) = block.warp.bounds();
+        assert!(min.length() < 1e-6, "{min}");
+        assert!(
+            (max - glam::DVec3::new(4.0, 3.0, 4.0)).length() < 1e-6,
+            "{max}"
+        );
+        assert!(mapped.coverage.inside > 0.999);
+    }
+
+    #[test]
+    fn two_rooms_are_joined_through_a_doorway_and_apart_without_it() {
+        let rooms_apart = [[0..4, 0..3, 0..4], [5..9, 0..3, 0..4]];
+        let apart = map(&rooms(&rooms_apart), 4.0).level;
+        assert_eq!(reached(&apart), 1);
+        assert_eq!((apart.blocks.len(), apart.connections.len()), (2, 0));
+        // 2 x 2 m of a side of 4 x 3 m.
+        let door = [[0..4, 0..3, 0..4], [5..9, 0..3, 0..4], [4..5, 0..2, 1..3]];
+        let joined = map(&rooms(&door), 4.0).level;
+        assert!(joined.blocks.len() >= 2);
+        assert_eq!(reached(&joined), joined.blocks.len());
+    }
+
+    #[test]
+    fn a_corridor_around_a_corner_is_a_chain() {
+        let mesh = rooms(&[[0..12, 0..3, 0..3], [9..12, 0..3, 0..12]]);
+        let level = map(&mesh, 3.0).level;
+        assert_eq!(reached(&level), level.blocks.len());
+        assert_eq!(level.connections.len(), level.blocks.len() - 1);
+        let count = |name| level.blocks.iter().filter(|b| b.shape.name == name).count();
+        assert_eq!((count("dead_end"), count("corner")), (2, 1));
+        assert_eq!(count("straight"), level.blocks.len() - 3);
+    }
+
+    #[test]
+    fn storeys_become_layers_with_nothing_between() {
+        let mesh = rooms(&[[0..4, 0..3, 0..4], [0..4, 4..7, 0..4]]);
+        let level = map(&mesh, 4.0).level;
+        assert_eq!((level.blocks.len(), level.connections.len()), (2, 0));
+    }
+
+    #[test]
+    fn a_missing_side_is_an_opening_to_the_outside() {
+        let mut mesh = rooms(&[[0..4, 0..4, 0..4]]);
+        let is_front = |t: &[u32; 3]| t.iter().all(|&v| mesh.positions[v as usize].z == 0.0);
+        let kept: Vec<[u32; 3]> = mesh
+            .triangles
+            .iter()
+            .copied()
+            .filter(|t| !is_front(t))
+            .collect();
+        mesh = TriangleMesh::from_triangles(mesh.positions, kept);
+        let level = map(&mesh, 4.0).level;
+        assert_eq!(level.blocks.len(), 1);
+        assert!(level.blocks[0].is_open(Face::NegZ));
+        assert!(level.connections.is_empty());
+    }
+
+    #[test]
+    fn faces_turned_outwards_are_noticed() {
+        let mut mesh = rooms(&[[0..4, 0..3, 0..4]]);
+        mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let mapped = map(&mesh, 4.0);
+        assert!(mapped.is_reversed);
+        assert_eq!(mapped.level.blocks.len(), 1);
+    }
+
+    #[test]
+    fn triangles_that_are_not_numbers_change_nothing() {
+        let clean = rooms(&[[0..4, 0..3, 0..4]]);
+        let mut faulty = clean.clone();
+        let first = faulty.positions.len() as u32;
+        faulty
+            .positions
+            .extend([Vec3::NAN, Vec3::splat(f32::INFINITY), Vec3::ONE]);
+        faulty.triangles.push([first, first + 1, first + 2]);
+        faulty.triangles.push([0, 0, 1]);
+        faulty.triangle_materials.extend([0, 0]);
+        let (cleaned, _) = mrt_core::mesh::clean(&faulty).expect("indices in range");
+        assert_eq!(map(&cleaned, 4.0).level, map(&clean, 4.0).level);
+    }
+
+    #[test]
+    fn the_limit_on_blocks_holds() {
+        let mesh = rooms(&[[0..16, 0..3, 0..16]]);
+        let config = MapConfig {
+            cell: Some(2.0),
+            max_blocks: 9,
+            tolerance: 0.0,
+            ..MapConfig::default()
+        };
+        let mapped = map_mesh(&mesh, &config).expect("a level");
+        assert!(mapped.level.blocks.len() <= 9);
+        assert_eq!(reached(&mapped.level), mapped.level.blocks.len());
+    }
+
+    #[test]
+    fn a_box_holds_everything_but_outliers() {
+        let mut mesh = rooms(&[[0..4, 0..3, 0..4]]);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([
+            Vec3::new(90.0, 0.0, 0.0),
+            Vec3::new(90.0, 0.1, 0.0),
+            Vec3::new(90.0, 0.0, 0.1),
+        ]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+        mesh.triangle_materials.push(0);
+        let config = MapConfig {
+            fit: Fit::Box,
+            ..MapConfig::default()
+        };
+        let level = map_mesh(&mesh, &config).expect("a level").level;
+        let (min, max) = level.blocks[0].warp.bounds();
+        assert!(
+            min.length() < 0.1 && max.distance(glam::DVec3::new(4.0, 3.0, 4.0)) < 0.1,
+            "{max}"
+        );
+    }
+
+    #[test]
+    fn meshes_without_rooms_have_no_grid() {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Z];
+        let mesh = TriangleMesh::from_triangles(corners, vec![[0, 1, 2]]);
+        let grid = map_mesh(&mesh, &MapConfig::default());
+        assert_eq!(grid.expect_err("no rooms"), MapError::NoFreeSpace);
+    }
+}

@@ -3,7 +3,6 @@
 use crate::dictionary_source::{SourceError, load};
 use crate::table::Table;
 use glam::Vec3;
-use mrt_core::cube::Face;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::{Bounces, Frame, FrameError};
@@ -84,18 +83,6 @@ pub enum AccuracyError {
         scene: String,
         /// Why.
         source: FrameError,
-    },
-    /// Texels of dictionary and reference differ.
-    #[error(
-        "{scene}: the reference has {found}² texels a wall; expected the dictionary's {expected}²"
-    )]
-    Resolution {
-        /// Name of the reference.
-        scene: String,
-        /// The dictionary's.
-        expected: usize,
-        /// The reference's.
-        found: usize,
     },
     /// Probe references.
     #[error(
@@ -210,13 +197,6 @@ pub fn compare(
             scene: scene_name(),
         });
     };
-    if resolution != dictionary.resolution {
-        return Err(AccuracyError::Resolution {
-            scene: scene_name(),
-            expected: dictionary.resolution,
-            found: resolution,
-        });
-    }
     let albedo = args.albedo.unwrap_or(match args.bounces {
         BouncesArg::First => 1.0,
         BouncesArg::All => 0.5,
@@ -244,7 +224,8 @@ pub fn compare(
                     scene: scene_name(),
                     source,
                 })?;
-            let (ours, theirs) = signals(reference, &scene, &frame, light, albedo, args)?;
+            let theirs = reference_signal(reference, light, albedo, args)?;
+            let ours = our_signal(reference, &scene, &frame, resolution);
             Ok(LightAccuracy {
                 scene: scene_name(),
                 light,
@@ -288,51 +269,59 @@ fn frame_bounces(reference: &ReferenceFile, args: &AccuracyArgs) -> Bounces {
     }
 }
 
-/// Our and the reference's indirect irradiance, in the reference's order of texels and channels.
-fn signals(
+/// The reference's indirect irradiance, channels together.
+fn reference_signal(
     reference: &ReferenceFile,
-    scene: &Scene,
-    frame: &Frame,
     light: usize,
     albedo: f64,
     args: &AccuracyArgs,
-) -> Result<(Vec<f64>, Vec<f64>), AccuracyError> {
+) -> Result<Vec<f64>, ReferenceError> {
     let bounces = match args.bounces {
         BouncesArg::First => mrt_tests::Bounces::First,
         BouncesArg::All => mrt_tests::Bounces::All,
     };
-    let (theirs, channels) = match reference.kind {
+    match reference.kind {
         Kind::IrradianceRgb { .. } => {
             let rgb = reference.indirect_irradiance_rgb(light, bounces)?;
-            (rgb.as_flattened().to_vec(), 3)
+            Ok(rgb.as_flattened().to_vec())
         }
-        _ => (reference.indirect_irradiance(light, bounces, albedo)?, 1),
-    };
-    let mut ours = Vec::with_capacity(theirs.len());
-    for (block, face) in reference.walls.iter().copied() {
-        push_wall(scene, frame, (block, face), channels, &mut ours);
+        _ => reference.indirect_irradiance(light, bounces, albedo),
     }
-    Ok((ours, theirs))
 }
 
-/// Appends a wall's texels, row by row, `channels` values each.
-fn push_wall(
+/// Our indirect irradiance at the reference's texel centres, in its order of texels and channels.
+///
+/// It is looked up in the lightmap as a game does, so dictionaries of any resolution can be compared; at the
+/// reference's own the lookup returns the texels.
+fn our_signal(
+    reference: &ReferenceFile,
     scene: &Scene,
     frame: &Frame,
-    (block, face): (usize, Face),
-    channels: usize,
-    out: &mut Vec<f64>,
-) {
-    for row in 0..scene.resolution {
-        for column in 0..scene.resolution {
+    resolution: usize,
+) -> Vec<f64> {
+    let channels = match reference.kind {
+        Kind::IrradianceRgb { .. } => 3,
+        _ => 1,
+    };
+    let mut ours = Vec::new();
+    for (block, face) in reference.walls.iter().copied() {
+        let canonical = scene.blocks[block].orientation.inverse();
+        for texel in 0..resolution * resolution {
+            let (row, column) = (texel / resolution, texel % resolution);
+            let point = canonical.point(face.texel_center(resolution, row, column));
+            let face = canonical.face(face);
+            let (u, v) = (point[face.u_axis()] as f32, point[face.v_axis()] as f32);
             // Walls of the reference are walls of the level: both follow from the cells.
-            let texel = scene.level_texel(block, face, row, column);
-            for channel in 0..channels {
-                let value = texel.map_or(0.0, |t| frame.indirect_at(scene, block, t)[channel]);
-                out.push(f64::from(value));
-            }
+            let light = scene
+                .atlas
+                .pixel(block, face, u, v)
+                .map_or([0.0; 3], |pixel| {
+                    scene.atlas.sample(frame.lightmap(), pixel)
+                });
+            ours.extend(light[..channels].iter().map(|&e| f64::from(e)));
         }
     }
+    ours
 }
 
 fn print(all: &[LightAccuracy]) {

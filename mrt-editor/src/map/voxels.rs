@@ -73,7 +73,7 @@ impl VoxelGrid {
     }
 
     /// Number of voxels.
-    pub fn len(&self) -> usize {
+    pub fn voxel_count(&self) -> usize {
         self.count.iter().product()
     }
 
@@ -113,7 +113,7 @@ impl FreeSpace {
 
 /// Finds the free voxels among triangles given by their corners.
 pub fn find_free_space(triangles: &[[Vec3; 3]], grid: VoxelGrid, winding: Winding) -> FreeSpace {
-    let count = grid.len();
+    let count = grid.voxel_count();
     let mut space = FreeSpace {
         grid,
         free: Vec::new(),

@@ -14,6 +14,9 @@ const FIRST_SHADOW_RAYS: u32 = 2;
 /// Shadow rays where the first disagree.
 const SHADOW_RAYS: u32 = 8;
 
+/// Lights below this share of all light at a point, were there no shadows, are left out.
+const NEGLIGIBLE_SHARE: f32 = 2e-3;
+
 /// A sphere light; irradiance is `intensity cos θ / max(d², radius²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SphereLight {
@@ -116,16 +119,24 @@ impl LitScene<'_> {
     /// Irradiance straight from the lights, with soft shadows.
     fn direct(&self, surface: &Surface) -> Vec3 {
         let seed = hash(surface.position.x.to_bits(), surface.position.z.to_bits());
-        let mut sum = Vec3::ZERO;
-        for light in self.lights {
+        let unshadowed = |light: &SphereLight| {
             let offset = light.position - surface.position;
             let squared = offset.length_squared().max(light.radius * light.radius);
             let cosine = surface.normal.dot(offset.normalize_or_zero());
             if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
+                return Vec3::ZERO;
+            }
+            light.intensity * (cosine / squared)
+        };
+        let most: Vec3 = self.lights.iter().map(unshadowed).sum();
+        let mut sum = Vec3::ZERO;
+        for light in self.lights {
+            let irradiance = unshadowed(light);
+            // Not worth a ray.
+            if irradiance.cmple(most * NEGLIGIBLE_SHARE).all() {
                 continue;
             }
-            let share = self.visible_share(surface, light, seed);
-            sum += light.intensity * (cosine / squared * share);
+            sum += irradiance * self.visible_share(surface, light, seed);
         }
         sum
     }
