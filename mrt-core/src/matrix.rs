@@ -264,8 +264,7 @@ pub fn multiply_add<T: Scalar>(a: MatrixView<T>, b: MatrixView<T>, out: &mut [T]
             }
             k += 4;
         }
-        for k in k..a.columns {
-            let w = weights[k];
+        for (k, &w) in weights.iter().enumerate().skip(k) {
             for (o, &x) in out_column.iter_mut().zip(a.column(k)) {
                 *o += x * w;
             }

@@ -161,7 +161,7 @@ fn image(mirrors: &[Vec<u32>], element: u32, point: u32) -> u32 {
 
 /// The character of `class` at a group element: -1 for each mirror that is in both.
 fn sign(class: usize, element: u32) -> f64 {
-    if (class as u32 & element).count_ones() % 2 == 0 {
+    if (class as u32 & element).count_ones().is_multiple_of(2) {
         1.0
     } else {
         -1.0

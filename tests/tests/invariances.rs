@@ -121,11 +121,6 @@ fn quarter_turns_of_the_level_turn_its_light() {
         for cell in &mut cells {
             *cell = [cell[1], -cell[0] - 1];
         }
-        map = if map(Vec3::X) == next(Vec3::X) {
-            map
-        } else {
-            next
-        };
         let mut level = floor_plan(&cells, 0.7);
         for (block, original) in level.blocks.iter_mut().zip(&painted(&CELLS).blocks) {
             block.albedo = original.albedo;

@@ -141,7 +141,7 @@ fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
         }
     }
     match args.enrichment {
-        Some(weight) if weight == 0.0 => config.enrichment = None,
+        Some(0.0) => config.enrichment = None,
         Some(weight) => {
             if let Some(enrichment) = &mut config.enrichment {
                 enrichment.constant_weight = weight;
