@@ -76,7 +76,7 @@ pub struct ImportReport {
     pub materials: usize,
     /// Of these, how many take their colour from the file but moved into [`ALBEDO_RANGE`].
     pub clamped_albedos: usize,
-    /// Of these, how many have a grey made up from their name.
+    /// Of these, how many have a colour made up from their name.
     pub made_up_albedos: usize,
 }
 
@@ -226,6 +226,7 @@ fn tidy(path: &Path, raw: RawMesh, config: &ImportConfig) -> Result<ImportedScen
     let is_overridden = config.albedo.is_some();
     let report = ImportReport {
         triangles: mesh.triangles.len(),
+        unused_vertices: tidied.unused_vertices + raw.unused_vertices,
         scale: config.scale,
         size_m: (high - low).to_array(),
         materials: used(|_| true),
@@ -264,6 +265,8 @@ struct RawMesh {
     triangles: Vec<[u32; 3]>,
     triangle_materials: Vec<u32>,
     paints: Vec<Paint>,
+    /// Vertices of the file that no face uses and that are not among the positions.
+    unused_vertices: usize,
 }
 
 /// A material of the file.
@@ -296,7 +299,7 @@ impl Paint {
         let albedo = match (config.albedo, self.colour) {
             (Some(albedo), _) => Vec3::splat(albedo),
             (None, Some(colour)) => clamp_albedo(colour),
-            (None, None) => Vec3::splat(grey_of_name(&self.name)),
+            (None, None) => colour_of_name(&self.name),
         };
         Material {
             name: self.name.clone(),
@@ -310,12 +313,16 @@ fn clamp_albedo(colour: Vec3) -> Vec3 {
     colour.clamp(Vec3::splat(low), Vec3::splat(high))
 }
 
-/// A grey between 0.5 and 0.6 by FNV-1a: the same on every machine and with every compiler.
-fn grey_of_name(name: &str) -> f32 {
-    let hash = name.bytes().fold(0x811c_9dc5_u32, |hash, byte| {
-        (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-    });
-    0.5 + 0.1 * (hash >> 8) as f32 / (1u32 << 24) as f32
+/// A colour of little saturation, each channel between 0.45 and 0.62, by FNV-1a: the same on every
+/// machine and with every compiler.
+fn colour_of_name(name: &str) -> Vec3 {
+    let hash = |seed: u32| {
+        let hash = name.bytes().fold(0x811c_9dc5 ^ seed, |hash: u32, byte| {
+            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
+        });
+        (hash >> 8) as f32 / (1u32 << 24) as f32
+    };
+    Vec3::new(hash(1), hash(2), hash(3)) * 0.17 + 0.45
 }
 
 fn read_file(path: &Path) -> Result<Vec<u8>, ImportError> {
@@ -407,8 +414,8 @@ mod tests {
     fn albedos_leave_the_extremes() {
         let text = b"mtllib none.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
         let scene = read_text("a.obj", text).expect("reads");
-        let grey = scene.mesh.materials[0].albedo.x;
-        assert!((0.5..=0.6).contains(&grey));
+        let made_up = scene.mesh.materials[0].albedo;
+        assert!(made_up.min_element() >= 0.45 && made_up.max_element() <= 0.62);
         let paint = Paint::new("red", Some(Vec3::X));
         assert!(paint.is_clamped());
         assert_eq!(paint.material(&CONFIG).albedo, Vec3::new(0.9, 0.05, 0.05));

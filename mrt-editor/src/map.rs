@@ -107,6 +107,13 @@ pub enum MapError {
          most sides; try --winding both, or --fit box for one block around everything"
     )]
     NoFreeSpace,
+    /// Triangles lie over one another by the thousand.
+    #[error(
+        "the scene's triangles overlap too much: found over {} crossings of voxel rows; expected a level \
+         of rooms (try a larger --cell)",
+        voxels::MOST_CROSSINGS
+    )]
+    TooDense,
     /// The cell size is not a positive number.
     #[error("--cell {found}; expected a positive number of metres")]
     Cell {
@@ -170,21 +177,22 @@ fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapErr
     let size = (high - low).as_dvec3();
     let voxel_edge = |voxels: f64| {
         // Flat scenes have an area but no volume to share out.
-        let flat = size.max_element() / voxels.sqrt();
+        let flat = size.max_element() / (voxels / 4.0).sqrt();
         (size.element_product() / voxels).cbrt().max(flat)
     };
-    let free_space = |edge: f64, winding: Winding| {
-        find_free_space(&triangles, VoxelGrid::around(low, high, edge), winding)
+    let free_space = |edge: f64| {
+        let grid = VoxelGrid::around(low, high, edge);
+        find_free_space(&triangles, grid, config.winding).ok_or(MapError::TooDense)
     };
     let cell = match config.cell {
         Some(cell) => cell,
         None => {
-            let first = free_space(voxel_edge(FIRST_VOXELS), config.winding);
+            let first = free_space(voxel_edge(FIRST_VOXELS))?;
             usual_cell(&first, config.max_blocks).ok_or(MapError::NoFreeSpace)?
         }
     };
     let edge = (cell / VOXELS_A_CELL).max(voxel_edge(MOST_VOXELS));
-    let space: FreeSpace = free_space(edge, config.winding);
+    let space: FreeSpace = free_space(edge)?;
     let columns = Columns::new(&space, LEAST_HEADROOM * cell);
     if columns.runs.is_empty() {
         return Err(MapError::NoFreeSpace);

@@ -172,7 +172,9 @@ impl ReceiverMap {
         let mut count = 1;
         for &other in self.lookup.candidates(own.place) {
             let other = other as usize;
-            if count == MOST_BLENDED || self.is_continuous(own.block, other) {
+            // The walls of joined blocks run into one another anyway.
+            let is_joined = self.blocks[own.block].neighbours.contains(&other);
+            if count == MOST_BLENDED || other == own.block || is_joined {
                 continue;
             }
             let placed = &self.blocks[other];
@@ -183,7 +185,10 @@ impl ReceiverMap {
             let unit = placed.unit(own.place);
             let beyond = placed.map.point(unit).distance(own.place) - own.distance;
             let weight = (1.0 - beyond / (BLEND_DISTANCE * placed.width)).clamp(0.0, 1.0);
-            let inside = placed.map.point(unit.lerp(DVec3::splat(0.5), 0.1));
+            // Into the other block, along the surface: beyond a slab between, but not behind the surface.
+            let closest = placed.map.point(unit);
+            let to_center = placed.map.point(DVec3::splat(0.5)) - closest;
+            let inside = closest + 0.06 * to_center.reject_from_normalized(normal);
             if weight > 0.0 && sees(inside.as_vec3()) {
                 blocks[count] = (other, placed.unit_from(unit, point), weight * weight);
                 count += 1;
@@ -207,13 +212,6 @@ impl ReceiverMap {
                 blend.add(on_face(block, face, unit), share * weight(face) / total);
             }
         }
-    }
-
-    /// True for a block itself and those whose walls run on into its walls.
-    fn is_continuous(&self, block: usize, other: usize) -> bool {
-        let joined = |a: usize, b: usize| self.blocks[a].neighbours.contains(&b);
-        let around = &self.blocks[block].neighbours;
-        block == other || joined(block, other) || around.iter().any(|&b| joined(b, other))
     }
 
     /// Where a point lies on a wall of a block, moved inside it.

@@ -5,7 +5,7 @@
 //! creases inside a block it repeats the wall's own edge.
 
 use crate::scene::{Beyond, SceneBlock};
-use glam::Vec2;
+use glam::{DVec3, Vec2};
 use mrt_core::cube::Face;
 
 /// Where each texel of a scene goes in the lightmap.
@@ -131,6 +131,9 @@ impl AtlasLayout {
 
 /// The texel, as (block, index in it), that column and row of a wall show, both in -1..=resolution: one
 /// step outside is the neighbour's wall across an opening, or the nearest texel inside at a crease.
+///
+/// A corner is two steps away. Where only one of the two ways round it is open, that one counts, so that
+/// all blocks of a room agree on the corner that they share.
 fn texel_seen(
     blocks: &[SceneBlock],
     block: usize,
@@ -138,38 +141,54 @@ fn texel_seen(
     [column, row]: [isize; 2],
     resolution: usize,
 ) -> Option<(usize, usize)> {
-    let last = resolution as isize - 1;
-    let inside = [column.clamp(0, last), row.clamp(0, last)];
-    let here = &blocks[block];
-    // Corners follow one edge only, u first: a block diagonally across has no common edge.
-    let sides = [
-        (face.u_axis(), column - inside[0]),
-        (face.v_axis(), row - inside[1]),
-    ];
-    for (axis, step) in sides {
-        let Some(side) = (step != 0).then(|| Face::from_axis(axis, step > 0)) else {
-            continue;
-        };
-        if let Beyond::Block {
+    let center = |k: isize| (k as f64 + 0.5) / resolution as f64;
+    let pixel = face.point(center(column), center(row));
+    let side = |axis: usize, k: isize| {
+        let inside = (0..resolution as isize).contains(&k);
+        (!inside).then(|| Face::from_axis(axis, k > 0))
+    };
+    let [u, v] = [side(face.u_axis(), column), side(face.v_axis(), row)];
+    let (crossed, seen) = walk(blocks, block, face, pixel, [u, v], resolution)?;
+    let (crossed_v_first, seen_v_first) = walk(blocks, block, face, pixel, [v, u], resolution)?;
+    Some(if crossed_v_first > crossed {
+        seen_v_first
+    } else {
+        seen
+    })
+}
+
+/// Follows a wall from block to block over `sides`, those that are open, and returns how many were and the
+/// texel nearest to `pixel`, a point in the plane of the first block's wall.
+fn walk(
+    blocks: &[SceneBlock],
+    mut block: usize,
+    mut wall: Face,
+    mut pixel: DVec3,
+    mut sides: [Option<Face>; 2],
+    resolution: usize,
+) -> Option<(usize, (usize, usize))> {
+    let mut crossed = 0;
+    for k in 0..sides.len() {
+        let Some(side) = sides[k] else { continue };
+        let Beyond::Block {
             block: there,
             here_from_there,
             ..
-        } = here.beyond[side.index()]
-        {
-            let there_from_here = here_from_there.inverse();
-            let center = face.texel_center(resolution, inside[1] as usize, inside[0] as usize);
-            let step = side.outward() / resolution as f64;
-            // The neighbour's cube stands one width further on.
-            let beyond = there_from_here.point(center + step - side.outward());
-            let wall = there_from_here.face(face);
-            if let Some(offset) = blocks[there].shape.wall_offset(wall, resolution) {
-                return Some((there, offset + wall.texel_index(beyond, resolution)));
-            }
+        } = blocks[block].beyond[side.index()]
+        else {
+            continue;
+        };
+        let there_from_here = here_from_there.inverse();
+        if blocks[there].shape.is_open(there_from_here.face(wall)) {
+            continue;
         }
+        block = there;
+        wall = there_from_here.face(wall);
+        // The neighbour's cube stands one width further on.
+        pixel = there_from_here.point(pixel - side.outward());
+        sides = sides.map(|side| side.map(|side| there_from_here.face(side)));
+        crossed += 1;
     }
-    let offset = here.shape.wall_offset(face, resolution)?;
-    Some((
-        block,
-        offset + inside[1] as usize * resolution + inside[0] as usize,
-    ))
+    let offset = blocks[block].shape.wall_offset(wall, resolution)?;
+    Some((crossed, (block, offset + wall.texel_index(pixel, resolution))))
 }

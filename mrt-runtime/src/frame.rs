@@ -87,11 +87,13 @@ pub enum FrameError {
         found: usize,
     },
     /// The buffers were made for a scene of another size.
-    #[error("the frame's buffers hold {expected} texels; the scene has {found}")]
+    #[error("the frame's buffers hold {expected} {what}; the scene has {found}")]
     OtherScene {
-        /// Texels of the scene that the buffers were made for.
+        /// What there is another number of.
+        what: &'static str,
+        /// Those of the scene that the buffers were made for.
         expected: usize,
-        /// Texels of the scene given.
+        /// Those of the scene given.
         found: usize,
     },
 }
@@ -155,11 +157,25 @@ impl Frame {
     }
 
     fn check(&mut self, scene: &Scene, lights: &[Light]) -> Result<(), FrameError> {
-        if 3 * scene.texel_count() != self.direct.len() {
-            return Err(FrameError::OtherScene {
-                expected: self.direct.len() / 3,
-                found: scene.texel_count(),
-            });
+        // Doors and shapes may differ where the number of texels does not.
+        let pixels = scene.atlas.width * scene.atlas.height;
+        for (what, expected, found) in [
+            ("texels", self.direct.len() / 3, scene.texel_count()),
+            (
+                "coefficients",
+                self.coefficients.len() / 3,
+                scene.coefficient_count,
+            ),
+            ("responses", self.responses.len() / 3, scene.response_count),
+            ("lightmap pixels", self.lightmap.len(), pixels),
+        ] {
+            if found != expected {
+                return Err(FrameError::OtherScene {
+                    what,
+                    expected,
+                    found,
+                });
+            }
         }
         if lights.len() > MAX_LIGHTS {
             return Err(FrameError::TooManyLights {

@@ -237,8 +237,8 @@ fn buffers_of_another_scene_are_refused() {
     let scene = assembled(&level());
     let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(1));
     let before = snapshot(&frame);
-    let larger = assembled(&floor_plan(&[[0, 0], [1, 0], [2, 0], [3, 0]], 0.6));
-    // As many texels, but other operators: a door less, and the same blocks in another order.
+    let larger = assembled(&floor_plan(&[[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], 0.6));
+    // As many texels, but fewer responses.
     let one_door_less = assembled(&level_with_a_door_outside());
     for other in [&larger, &one_door_less] {
         let error = frame

@@ -8,6 +8,10 @@
 
 use glam::{DVec3, Vec3};
 
+/// Rows that triangles may cross along one axis, all together. Levels have a few million; a pile of
+/// triangles as large as the scene would fill the memory.
+pub const MOST_CROSSINGS: usize = 100_000_000;
+
 /// A regular grid of cubes.
 #[derive(Clone, Debug)]
 pub struct VoxelGrid {
@@ -111,8 +115,12 @@ impl FreeSpace {
     }
 }
 
-/// Finds the free voxels among triangles given by their corners.
-pub fn find_free_space(triangles: &[[Vec3; 3]], grid: VoxelGrid, winding: Winding) -> FreeSpace {
+/// Finds the free voxels among triangles given by their corners; `None` above [`MOST_CROSSINGS`].
+pub fn find_free_space(
+    triangles: &[[Vec3; 3]],
+    grid: VoxelGrid,
+    winding: Winding,
+) -> Option<FreeSpace> {
     let count = grid.voxel_count();
     let mut space = FreeSpace {
         grid,
@@ -124,7 +132,7 @@ pub fn find_free_space(triangles: &[[Vec3; 3]], grid: VoxelGrid, winding: Windin
     };
     let mut sight = vec![Sight::default(); count];
     for axis in 0..3 {
-        let rows = crossings_by_row(triangles, &space.grid, axis);
+        let rows = crossings_by_row(triangles, &space.grid, axis)?;
         scan_rows(&rows, axis, &mut space, &mut sight);
     }
     let front = || sight.iter().map(Sight::is_free).collect::<Vec<_>>();
@@ -145,7 +153,7 @@ pub fn find_free_space(triangles: &[[Vec3; 3]], grid: VoxelGrid, winding: Windin
     for _ in 0..2 {
         smooth(&mut space);
     }
-    space
+    Some(space)
 }
 
 /// What a voxel sees along the six axis directions.
@@ -196,9 +204,14 @@ fn plane_axes(axis: usize) -> [usize; 2] {
 }
 
 /// Projects every triangle along `axis`; rows are indexed a + b * count[a] over the plane's axes.
-fn crossings_by_row(triangles: &[[Vec3; 3]], grid: &VoxelGrid, axis: usize) -> Vec<Vec<Crossing>> {
+fn crossings_by_row(
+    triangles: &[[Vec3; 3]],
+    grid: &VoxelGrid,
+    axis: usize,
+) -> Option<Vec<Vec<Crossing>>> {
     let [a, b] = plane_axes(axis);
     let mut rows = vec![Vec::new(); grid.count[a] * grid.count[b]];
+    let mut tests = 0;
     for corners in triangles {
         let corners = corners.map(|corner| corner.as_dvec3());
         // Twice the projected area; positive when the normal points along +axis.
@@ -214,8 +227,13 @@ fn crossings_by_row(triangles: &[[Vec3; 3]], grid: &VoxelGrid, axis: usize) -> V
             let end = (last + 1.0).clamp(0.0, grid.count[side] as f64) as usize;
             first..end
         };
-        for j in range(b) {
-            for i in range(a) {
+        let (columns, lines) = (range(a), range(b));
+        tests += columns.len() * lines.len();
+        if tests > MOST_CROSSINGS {
+            return None;
+        }
+        for j in lines {
+            for i in columns.clone() {
                 let point = [grid.center(a, i), grid.center(b, j)];
                 // Barycentric weights; edges belong to both triangles, so that no row slips between.
                 let mut coordinate = 0.0;
@@ -237,7 +255,7 @@ fn crossings_by_row(triangles: &[[Vec3; 3]], grid: &VoxelGrid, axis: usize) -> V
             }
         }
     }
-    rows
+    Some(rows)
 }
 
 /// Tells every voxel of every row what lies before and behind it.

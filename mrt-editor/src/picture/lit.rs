@@ -9,10 +9,10 @@ use mrt_runtime::atlas::AtlasLayout;
 use std::f32::consts::PI;
 
 /// Shadow rays to each light that are always cast.
-const FIRST_SHADOW_RAYS: u32 = 2;
+const FIRST_SHADOW_RAYS: u32 = 3;
 
 /// Shadow rays where the first disagree.
-const SHADOW_RAYS: u32 = 8;
+const SHADOW_RAYS: u32 = 16;
 
 /// Lights below this share of all light at a point, were there no shadows, are left out.
 const NEGLIGIBLE_SHARE: f32 = 2e-3;
@@ -141,7 +141,7 @@ impl LitScene<'_> {
         sum
     }
 
-    /// Share of a light that is seen: two rays where they agree, more in penumbras.
+    /// Share of a light that is seen: a few rays where they agree, more in penumbras.
     fn visible_share(&self, surface: &Surface, light: &SphereLight, seed: u32) -> f32 {
         let distance = light.position.distance(surface.position);
         let start = surface.position + surface.flat_normal * self.restart.min(1e-2 * distance);

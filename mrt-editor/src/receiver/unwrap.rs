@@ -7,6 +7,9 @@ use mrt_core::mesh::{TriangleMesh, face_normals};
 /// Triangles that reach into several blocks are halved until they do not, at most this often.
 const MOST_HALVINGS: u32 = 12;
 
+/// Nothing is halved any more once there are this many triangles.
+const MOST_TRIANGLES: usize = 10_000_000;
+
 /// Edges shorter than this share of the smallest block's diagonal are not halved: a triangle along a
 /// border reaches into both blocks however small it is.
 const SHORTEST_EDGE: f64 = 0.1;
@@ -42,7 +45,7 @@ pub fn unwrap(mesh: &TriangleMesh, receivers: &ReceiverMap) -> Vec<LitTriangle> 
             });
             let [a, b, c] = longest_first(corners);
             let is_long = f64::from(a.distance(b)) > SHORTEST_EDGE * receivers.smallest_diagonal;
-            if is_split && is_long && halvings < MOST_HALVINGS {
+            if is_split && is_long && halvings < MOST_HALVINGS && lit.len() < MOST_TRIANGLES {
                 let middle = a.midpoint(b);
                 pending.push(([a, middle, c], halvings + 1));
                 pending.push(([middle, b, c], halvings + 1));
