@@ -8,7 +8,7 @@ use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::dictionary_file::{DEFAULT_BYTE_BUDGET, DictionaryError};
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -64,8 +64,17 @@ pub fn load(file: Option<&Path>, preset: Option<&str>) -> Result<Dictionary, Sou
 /// # Errors
 /// [`SourceError::File`] and [`SourceError::Dictionary`].
 pub fn from_file(path: &Path) -> Result<Dictionary, SourceError> {
-    let bytes = read_file(path, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))?;
-    parse(&bytes, PathBuf::from(path).display().to_string())
+    let place = path.display().to_string();
+    let bytes = read_file(path, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET));
+    let bytes = bytes.map_err(|error| match error {
+        // These name the file themselves.
+        ContainerError::Io { .. } => SourceError::File(error),
+        other => SourceError::Dictionary {
+            place: place.clone(),
+            source: other.into(),
+        },
+    })?;
+    parse(&bytes, place)
 }
 
 fn parse(bytes: &[u8], place: String) -> Result<Dictionary, SourceError> {

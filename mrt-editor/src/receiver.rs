@@ -50,6 +50,9 @@ const BLEND_OFFSET: f64 = 0.15;
 /// one another over this distance, in block widths.
 const BLEND_DISTANCE: f64 = 0.4;
 
+/// Blocks below this, before it is squared to a weight, are not worth a ray.
+const LEAST_BLEND: f64 = 0.1;
+
 /// Blocks that one point takes light from, at most.
 const MOST_BLENDED: usize = 4;
 
@@ -189,7 +192,7 @@ impl ReceiverMap {
             let closest = placed.map.point(unit);
             let to_center = placed.map.point(DVec3::splat(0.5)) - closest;
             let inside = closest + 0.06 * to_center.reject_from_normalized(normal);
-            if weight > 0.0 && sees(inside.as_vec3()) {
+            if weight > LEAST_BLEND && sees(inside.as_vec3()) {
                 blocks[count] = (other, placed.unit_from(unit, point), weight * weight);
                 count += 1;
             }

@@ -44,7 +44,13 @@ fn text(bytes: &[u8]) -> String {
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("the folder is there");
     let mut names: Vec<String> = entries
-        .map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned())
+        .map(|entry| {
+            entry
+                .expect("readable")
+                .file_name()
+                .to_string_lossy()
+                .into_owned()
+        })
         .collect();
     names.sort();
     names
@@ -73,7 +79,10 @@ fn every_command_explains_itself() {
     }
     let output = mrt(&folder, &["--help"]);
     let help = text(&output.stdout);
-    assert!(COMMANDS.iter().all(|command| help.contains(command)), "{help}");
+    assert!(
+        COMMANDS.iter().all(|command| help.contains(command)),
+        "{help}"
+    );
     assert_eq!(mrt(&folder, &["--version"]).status.code(), Some(0));
     assert!(names(folder.path()).is_empty());
 }
@@ -91,16 +100,40 @@ fn wrong_usage_ends_with_code_2() {
         &["bake", "--out", "a.mrt", "--modes", "many"],
         &["bake", "--out", "a.mrt", "--set", "cylinders"],
         &["accuracy", "a.json", "--bounces", "second"],
-        &["accuracy", "a.json", "--preset", "mobile", "--dictionary", "d.mrt"],
-        &["light", "--scene", "a", "--level", "b", "--out", "c", "--size", "0x5"],
-        &["light", "--scene", "a", "--level", "b", "--out", "c", "--light", "1,2"],
-        &["light", "--scene", "a", "--level", "b", "--out", "c", "--bounces", "-1"],
+        &[
+            "accuracy",
+            "a.json",
+            "--preset",
+            "mobile",
+            "--dictionary",
+            "d.mrt",
+        ],
+        &[
+            "light", "--scene", "a", "--level", "b", "--out", "c", "--size", "0x5",
+        ],
+        &[
+            "light", "--scene", "a", "--level", "b", "--out", "c", "--light", "1,2",
+        ],
+        &[
+            "light",
+            "--scene",
+            "a",
+            "--level",
+            "b",
+            "--out",
+            "c",
+            "--bounces",
+            "-1",
+        ],
         &["map", "--scene", "a", "--out", "b", "--fit", "sphere"],
         &["demo", "--no-such-flag"],
     ] {
         let output = mrt(&folder, arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        assert!(!output.stderr.is_empty() && output.stdout.is_empty(), "{arguments:?}");
+        assert!(
+            !output.stderr.is_empty() && output.stdout.is_empty(),
+            "{arguments:?}"
+        );
     }
     assert!(names(folder.path()).is_empty());
 }
@@ -139,14 +172,21 @@ fn info_on_files_that_are_no_dictionary_says_so_in_a_sentence() {
 fn info_shows_the_default_dictionary() {
     let folder = folder();
     let file = default_dictionary();
-    let output = mrt(&folder, &[OsStr::new("info"), file.as_os_str(), OsStr::new("--json")]);
+    let output = mrt(
+        &folder,
+        &[OsStr::new("info"), file.as_os_str(), OsStr::new("--json")],
+    );
     assert_eq!(output.status.code(), Some(0));
     let info: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert_eq!(info["preset"], "standard");
     assert_eq!(info["resolution"], 16);
     let shapes = info["shapes"].as_array().expect("a list of shapes");
     assert_eq!(shapes.len(), 6);
-    assert!(shapes.iter().all(|shape| shape["modes"].as_u64() <= Some(32)));
+    assert!(
+        shapes
+            .iter()
+            .all(|shape| shape["modes"].as_u64() <= Some(32))
+    );
     let plain = mrt(&folder, &[OsStr::new("info"), file.as_os_str()]);
     assert_eq!(plain.status.code(), Some(0));
     assert!(text(&plain.stdout).contains("dead_end"));
@@ -170,7 +210,10 @@ fn bake_refuses_settings_out_of_range_and_leaves_nothing() {
         all.extend(arguments);
         assert_refused(&mrt(&folder, &all), subject);
     }
-    assert_refused(&mrt(&folder, &["bake", "--out", "a.mrt", "--enrichment=-1"]), "weight");
+    assert_refused(
+        &mrt(&folder, &["bake", "--out", "a.mrt", "--enrichment=-1"]),
+        "weight",
+    );
     assert!(names(folder.path()).is_empty());
 }
 
@@ -199,7 +242,9 @@ fn bake_writes_a_whole_file_or_none() {
     let output = bake("small.mrt");
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
-    let length = fs::metadata(folder.path().join("small.mrt")).expect("written").len();
+    let length = fs::metadata(folder.path().join("small.mrt"))
+        .expect("written")
+        .len();
     assert_eq!(report["file_bytes"].as_u64(), Some(length));
     assert_eq!(names(folder.path()), ["small.mrt"]);
     assert_eq!(mrt(&folder, &["info", "small.mrt"]).status.code(), Some(0));
@@ -212,7 +257,10 @@ fn bake_writes_a_whole_file_or_none() {
         assert_eq!(output.status.code(), Some(1), "{bad}: {error}");
         // Progress comes before it.
         let last = error.lines().last().unwrap_or_default();
-        assert!(last.starts_with("mrt: ") && last.contains(bad), "{bad}: {error}");
+        assert!(
+            last.starts_with("mrt: ") && last.contains(bad),
+            "{bad}: {error}"
+        );
         assert!(output.stdout.is_empty());
     }
     assert_eq!(names(folder.path()), ["occupied", "small.mrt"]);
@@ -228,7 +276,12 @@ fn accuracy_prints_an_object_a_light() {
     let file = |name: &str| oracle.join(name).into_os_string();
     let output = mrt(
         &folder,
-        &["accuracy".into(), file("cube.json"), file("corridor5.json"), "--json".into()],
+        &[
+            "accuracy".into(),
+            file("cube.json"),
+            file("corridor5.json"),
+            "--json".into(),
+        ],
     );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let stdout = text(&output.stdout);
@@ -267,13 +320,24 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
         let output = mrt(&folder, &["accuracy".into(), file(name), "--json".into()]);
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{error}");
-        assert!(error.contains(subject) && !error.contains("panicked"), "{error}");
+        assert!(
+            error.contains(subject) && !error.contains("panicked"),
+            "{error}"
+        );
         assert!(output.stdout.is_empty());
     }
     let stack = mrt(&folder, &["accuracy".into(), file("stack3.json")]);
-    assert!(text(&stack.stderr).contains("open only sideways"), "{}", text(&stack.stderr));
+    assert!(
+        text(&stack.stderr).contains("open only sideways"),
+        "{}",
+        text(&stack.stderr)
+    );
     let probes = mrt(&folder, &["accuracy".into(), file("cube_probes.json")]);
-    assert!(text(&probes.stderr).contains("radiance_sh9"), "{}", text(&probes.stderr));
+    assert!(
+        text(&probes.stderr).contains("radiance_sh9"),
+        "{}",
+        text(&probes.stderr)
+    );
     // The sound one is compared all the same.
     let both = [
         "accuracy".into(),
@@ -284,14 +348,22 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
     let output = mrt(&folder, &both);
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stdout).lines().count() > 0);
-    let albedo = ["accuracy".into(), file("cube.json"), "--albedo".into(), "1.5".into()];
+    let albedo = [
+        "accuracy".into(),
+        file("cube.json"),
+        "--albedo".into(),
+        "1.5".into(),
+    ];
     assert_refused(&mrt(&folder, &albedo), "1.5");
 }
 
 #[test]
 fn demo_writes_six_pictures() {
     let folder = folder();
-    let output = mrt(&folder, &["demo", "--no-exact", "--out", "pictures", "--json"]);
+    let output = mrt(
+        &folder,
+        &["demo", "--no-exact", "--out", "pictures", "--json"],
+    );
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
     assert_eq!(report["pictures"].as_array().map(Vec::len), Some(6));
@@ -314,12 +386,25 @@ fn demo_refuses_levels_that_are_none() {
         ("truncated.toml", &ROOM_LEVEL[..ROOM_LEVEL.len() - 20]),
     ] {
         fs::write(folder.path().join(name), content).expect("writable");
-        let output = mrt(&folder, &["demo", "--no-exact", "--out", "out", "--level", name]);
+        let output = mrt(
+            &folder,
+            &["demo", "--no-exact", "--out", "out", "--level", name],
+        );
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{name}: {error}");
-        assert!(error.starts_with("mrt: ") && output.stdout.is_empty(), "{name}: {error}");
+        assert!(
+            error.starts_with("mrt: ") && output.stdout.is_empty(),
+            "{name}: {error}"
+        );
     }
-    let missing = ["demo", "--no-exact", "--out", "out", "--level", "missing.toml"];
+    let missing = [
+        "demo",
+        "--no-exact",
+        "--out",
+        "out",
+        "--level",
+        "missing.toml",
+    ];
     assert_refused(&mrt(&folder, &missing), "missing.toml");
     assert!(!folder.path().join("out").exists());
 }
@@ -330,9 +415,18 @@ fn bad_meshes() -> Vec<(&'static str, Vec<u8>)> {
         ("empty.obj", Vec::new()),
         ("empty.glb", Vec::new()),
         ("no-faces.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec()),
-        ("truncated.obj", ROOM_OBJ.as_bytes()[..ROOM_OBJ.len() - 6].to_vec()),
-        ("no-such-vertex.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n".to_vec()),
-        ("not-a-number.obj", b"v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec()),
+        (
+            "truncated.obj",
+            ROOM_OBJ.as_bytes()[..ROOM_OBJ.len() - 6].to_vec(),
+        ),
+        (
+            "no-such-vertex.obj",
+            b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n".to_vec(),
+        ),
+        (
+            "not-a-number.obj",
+            b"v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_vec(),
+        ),
         ("binary.obj", vec![0xff; 300]),
         ("binary.glb", vec![0xff; 300]),
         ("truncated.glb", b"glTF\x02\0\0\0\xff\xff\0\0".to_vec()),
@@ -345,7 +439,16 @@ fn map_writes_a_whole_level_or_none() {
     let folder = folder();
     let file = |name: &str| folder.path().join(name);
     fs::write(file("room.obj"), ROOM_OBJ).expect("writable");
-    let map = ["map", "--scene", "room.obj", "--out", "room.toml", "--fit", "box", "--json"];
+    let map = [
+        "map",
+        "--scene",
+        "room.obj",
+        "--out",
+        "room.toml",
+        "--fit",
+        "box",
+        "--json",
+    ];
     let output = mrt(&folder, &map);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let report: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
@@ -357,10 +460,16 @@ fn map_writes_a_whole_level_or_none() {
     for (name, bytes) in bad_meshes() {
         fs::write(file(name), bytes).expect("writable");
         for fit in ["box", "grid"] {
-            let output = mrt(&folder, &["map", "--scene", name, "--out", "none.toml", "--fit", fit]);
+            let output = mrt(
+                &folder,
+                &["map", "--scene", name, "--out", "none.toml", "--fit", fit],
+            );
             let error = text(&output.stderr);
             assert_eq!(output.status.code(), Some(1), "{name}, {fit}: {error}");
-            assert!(error.starts_with("mrt: ") && !error.contains("panicked"), "{name}: {error}");
+            assert!(
+                error.starts_with("mrt: ") && !error.contains("panicked"),
+                "{name}: {error}"
+            );
         }
         fs::remove_file(file(name)).expect("still there");
     }
@@ -368,7 +477,12 @@ fn map_writes_a_whole_level_or_none() {
     assert_refused(&mrt(&folder, &missing), "missing.obj");
     let nowhere = ["map", "--scene", "room.obj", "--out", "nowhere/none.toml"];
     assert_refused(&mrt(&folder, &nowhere), "nowhere");
-    for faulty in [["--scale", "0"], ["--scale", "nan"], ["--albedo", "2"], ["--cell", "0"]] {
+    for faulty in [
+        ["--scale", "0"],
+        ["--scale", "nan"],
+        ["--albedo", "2"],
+        ["--cell", "0"],
+    ] {
         let mut arguments = vec!["map", "--scene", "room.obj", "--out", "none.toml"];
         arguments.extend(faulty);
         let output = mrt(&folder, &arguments);
@@ -394,7 +508,10 @@ fn light_writes_all_files_or_none() {
     let refused = |output: &Output, what: &str| {
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{what}: {error}");
-        assert!(error.starts_with("mrt: ") && !error.contains("panicked"), "{what}: {error}");
+        assert!(
+            error.starts_with("mrt: ") && !error.contains("panicked"),
+            "{what}: {error}"
+        );
         assert!(output.stdout.is_empty(), "{what}");
         assert!(!file("out").exists(), "{what}: partial output");
     };
@@ -406,22 +523,44 @@ fn light_writes_all_files_or_none() {
     for (name, content) in [
         ("empty.toml", &b""[..]),
         ("binary.toml", &[0xff; 100]),
-        ("truncated.toml", &ROOM_LEVEL.as_bytes()[..ROOM_LEVEL.len() - 20]),
+        (
+            "truncated.toml",
+            &ROOM_LEVEL.as_bytes()[..ROOM_LEVEL.len() - 20],
+        ),
         ("foreign.toml", b"format = \"other\"\nversion = 1\n"),
     ] {
         fs::write(file(name), content).expect("writable");
         let output = light("room.obj", name, &[]);
         refused(&output, name);
-        assert!(text(&output.stderr).contains(name), "{}", text(&output.stderr));
+        assert!(
+            text(&output.stderr).contains(name),
+            "{}",
+            text(&output.stderr)
+        );
         fs::remove_file(file(name)).expect("still there");
     }
     assert_refused(&light("missing.obj", "room.toml", &[]), "missing.obj");
     assert_refused(&light("room.obj", "missing.toml", &[]), "missing.toml");
-    refused(&light("room.obj", "room.toml", &["--dictionary", "room.obj"]), "dictionary");
-    refused(&light("room.obj", "room.toml", &["--preset", "ultra"]), "preset");
-    refused(&light("room.obj", "room.toml", &["--light", "9,1,1,5"]), "light outside");
-    refused(&light("room.obj", "room.toml", &["--light", "1,1,1,nan"]), "intensity");
-    refused(&light("room.obj", "room.toml", &["--camera", "1,1,1;1,1,1"]), "camera");
+    refused(
+        &light("room.obj", "room.toml", &["--dictionary", "room.obj"]),
+        "dictionary",
+    );
+    refused(
+        &light("room.obj", "room.toml", &["--preset", "ultra"]),
+        "preset",
+    );
+    refused(
+        &light("room.obj", "room.toml", &["--light", "9,1,1,5"]),
+        "light outside",
+    );
+    refused(
+        &light("room.obj", "room.toml", &["--light", "1,1,1,nan"]),
+        "intensity",
+    );
+    refused(
+        &light("room.obj", "room.toml", &["--camera", "1,1,1;1,1,1"]),
+        "camera",
+    );
     assert_eq!(names(folder.path()), ["room.obj", "room.toml"]);
 
     let output = light("room.obj", "room.toml", &["--light", "1,1.2,0.8,5"]);

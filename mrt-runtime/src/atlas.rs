@@ -129,11 +129,22 @@ impl AtlasLayout {
     }
 }
 
+/// A point in the plane of a block's wall, inside it or up to a texel beside it.
+#[derive(Clone, Copy)]
+struct Place {
+    block: usize,
+    wall: Face,
+    /// In the block's canonical cube.
+    point: DVec3,
+}
+
 /// The texel, as (block, index in it), that column and row of a wall show, both in -1..=resolution: one
 /// step outside is the neighbour's wall across an opening, or the nearest texel inside at a crease.
 ///
-/// A corner is two steps away. Where only one of the two ways round it is open, that one counts, so that
-/// all blocks of a room agree on the corner that they share.
+/// Up to four blocks meet where two openings of a block do, and all of their tiles must give the same
+/// mean there. With four, each tile shows all four. Around a pillar there are three, and each tile shows
+/// the middle one twice: the middle one's at its corner, the others' beside it, at their crease with the
+/// pillar.
 fn texel_seen(
     blocks: &[SceneBlock],
     block: usize,
@@ -142,53 +153,84 @@ fn texel_seen(
     resolution: usize,
 ) -> Option<(usize, usize)> {
     let center = |k: isize| (k as f64 + 0.5) / resolution as f64;
-    let pixel = face.point(center(column), center(row));
-    let side = |axis: usize, k: isize| {
-        let inside = (0..resolution as isize).contains(&k);
-        (!inside).then(|| Face::from_axis(axis, k > 0))
+    let here = Place {
+        block,
+        wall: face,
+        point: face.point(center(column), center(row)),
     };
-    let [u, v] = [side(face.u_axis(), column), side(face.v_axis(), row)];
-    let (crossed, seen) = walk(blocks, block, face, pixel, [u, v], resolution)?;
-    let (crossed_v_first, seen_v_first) = walk(blocks, block, face, pixel, [v, u], resolution)?;
-    Some(if crossed_v_first > crossed {
-        seen_v_first
-    } else {
-        seen
-    })
+    let last = resolution as isize - 1;
+    let (u, v) = (face.u_axis(), face.v_axis());
+    let outside = |axis, k| (k < 0 || k > last).then(|| Face::from_axis(axis, k > 0));
+    let seen = match (outside(u, column), outside(v, row)) {
+        (None, None) => here,
+        (Some(u), Some(v)) => {
+            let ways = [walk(blocks, here, [u, v]), walk(blocks, here, [v, u])];
+            match ways {
+                [(2, place), _] | [_, (2, place)] | [(1, place), (0, _)] | [(0, _), (1, place)] => {
+                    place
+                }
+                _ => here,
+            }
+        }
+        (Some(side), None) => beside(blocks, here, side, corner(v, row, last)),
+        (None, Some(side)) => beside(blocks, here, side, corner(u, column, last)),
+    };
+    let offset = blocks[seen.block]
+        .shape
+        .wall_offset(seen.wall, resolution)?;
+    let texel = seen.wall.texel_index(seen.point, resolution);
+    Some((seen.block, offset + texel))
 }
 
-/// Follows a wall from block to block over `sides`, those that are open, and returns how many were and the
-/// texel nearest to `pixel`, a point in the plane of the first block's wall.
-fn walk(
+/// The side that an outermost texel touches.
+fn corner(axis: usize, k: isize, last: isize) -> Option<Face> {
+    (k == 0 || k == last).then(|| Face::from_axis(axis, k > 0))
+}
+
+/// What a pixel beyond `side` shows; `corner` is the side that it is nearest to, if it is at the end.
+fn beside(blocks: &[SceneBlock], here: Place, side: Face, corner: Option<Face>) -> Place {
+    if let (1, place) = walk(blocks, here, [side]) {
+        return place;
+    }
+    let Some(corner) = corner else { return here };
+    match walk(blocks, here, [corner, side, corner.opposite()]) {
+        // The block beyond a door that is closed.
+        (3, place) => place,
+        (2, _) => walk(blocks, here, [corner]).1,
+        _ => here,
+    }
+}
+
+/// Follows a wall over `sides`, as `from` names them, up to the first that does not lead on; returns how many
+/// were crossed, and the same point as the last block sees it.
+fn walk<const N: usize>(
     blocks: &[SceneBlock],
-    mut block: usize,
-    mut wall: Face,
-    mut pixel: DVec3,
-    mut sides: [Option<Face>; 2],
-    resolution: usize,
-) -> Option<(usize, (usize, usize))> {
-    let mut crossed = 0;
-    for k in 0..sides.len() {
-        let Some(side) = sides[k] else { continue };
+    from: Place,
+    mut sides: [Face; N],
+) -> (usize, Place) {
+    let mut here = from;
+    for k in 0..N {
+        let side = sides[k];
         let Beyond::Block {
-            block: there,
+            block,
             here_from_there,
             ..
-        } = blocks[block].beyond[side.index()]
+        } = blocks[here.block].beyond[side.index()]
         else {
-            continue;
+            return (k, here);
         };
         let there_from_here = here_from_there.inverse();
-        if blocks[there].shape.is_open(there_from_here.face(wall)) {
-            continue;
+        let wall = there_from_here.face(here.wall);
+        if blocks[block].shape.is_open(wall) {
+            return (k, here);
         }
-        block = there;
-        wall = there_from_here.face(wall);
-        // The neighbour's cube stands one width further on.
-        pixel = there_from_here.point(pixel - side.outward());
-        sides = sides.map(|side| side.map(|side| there_from_here.face(side)));
-        crossed += 1;
+        here = Place {
+            block,
+            wall,
+            // The neighbour's cube stands one width further on.
+            point: there_from_here.point(here.point - side.outward()),
+        };
+        sides = sides.map(|side| there_from_here.face(side));
     }
-    let offset = blocks[block].shape.wall_offset(wall, resolution)?;
-    Some((crossed, (block, offset + wall.texel_index(pixel, resolution))))
+    (N, here)
 }

@@ -79,7 +79,11 @@ fn a_bake_can_be_cancelled_at_every_step() {
         };
         let result = bake(&config, &Progress::new(&report, &cancel));
         assert_eq!(result.err(), Some(Cancelled), "cancelled in step {last}");
-        assert_eq!(seen.load(Ordering::Relaxed), last + 1, "no step after {last}");
+        assert_eq!(
+            seen.load(Ordering::Relaxed),
+            last + 1,
+            "no step after {last}"
+        );
     }
 }
 

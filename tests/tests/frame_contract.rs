@@ -121,7 +121,10 @@ fn faulty_lights() -> Vec<(&'static str, Light)> {
             vector
         };
         for bad in all() {
-            faulty.push(("intensity", sphere(Vec3::splat(0.5), 0.1, with(Vec3::ONE, bad))));
+            faulty.push((
+                "intensity",
+                sphere(Vec3::splat(0.5), 0.1, with(Vec3::ONE, bad)),
+            ));
             faulty.push((
                 "irradiance",
                 Light::Directional {
@@ -131,7 +134,10 @@ fn faulty_lights() -> Vec<(&'static str, Light)> {
             ));
         }
         for bad in NOT_NUMBERS {
-            faulty.push(("position", sphere(with(Vec3::splat(0.5), bad), 0.1, Vec3::ONE)));
+            faulty.push((
+                "position",
+                sphere(with(Vec3::splat(0.5), bad), 0.1, Vec3::ONE),
+            ));
             faulty.push((
                 "direction",
                 Light::Directional {
@@ -192,7 +198,10 @@ fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
         };
         for light in [directional, spot(direction, 0.1, 0.2)] {
             let error = refuse(light);
-            assert!(matches!(error, LightError::NoDirection { light: 1, .. }), "{error}");
+            assert!(
+                matches!(error, LightError::NoDirection { light: 1, .. }),
+                "{error}"
+            );
         }
     }
     for position in [
@@ -202,7 +211,10 @@ fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
         Vec3::new(0.5, 1.001, 0.5),
     ] {
         let error = refuse(sphere(position, 0.1, Vec3::ONE));
-        assert!(matches!(error, LightError::OutsideBlocks { light: 1, .. }), "{error}");
+        assert!(
+            matches!(error, LightError::OutsideBlocks { light: 1, .. }),
+            "{error}"
+        );
     }
 }
 
@@ -223,11 +235,18 @@ fn extreme_but_legal_lights_give_finite_light() {
         }
     }
     lights.push(spot(Vec3::splat(1e-38), 0.0, 0.0));
-    lights.push(spot(Vec3::splat(1e9), std::f32::consts::PI, std::f32::consts::PI));
+    lights.push(spot(
+        Vec3::splat(1e9),
+        std::f32::consts::PI,
+        std::f32::consts::PI,
+    ));
     for light in &lights {
         let frame = solved(&scene, &[*light], Bounces::Count(8));
         for signal in [frame.direct(), frame.indirect()] {
-            assert!(signal.iter().all(|e| e.is_finite() && *e >= 0.0), "{light:?}");
+            assert!(
+                signal.iter().all(|e| e.is_finite() && *e >= 0.0),
+                "{light:?}"
+            );
         }
     }
 }
@@ -264,7 +283,11 @@ fn without_lights_everything_is_zero() {
         frame
             .solve(&scene, &[], &Openings, bounces)
             .expect("no lights are no fault");
-        let all = [frame.direct(), frame.indirect(), frame.lightmap().as_flattened()];
+        let all = [
+            frame.direct(),
+            frame.indirect(),
+            frame.lightmap().as_flattened(),
+        ];
         assert!(all.into_iter().flatten().all(|&e| e == 0.0), "{bounces:?}");
     }
 }
@@ -284,7 +307,11 @@ fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
         panic!("it is a spot");
     };
     let spot = solved(&scene, &[GOOD_SPOT], Bounces::Count(1));
-    let sphere = solved(&scene, &[sphere(position, radius, intensity)], Bounces::Count(1));
+    let sphere = solved(
+        &scene,
+        &[sphere(position, radius, intensity)],
+        Bounces::Count(1),
+    );
     let (spot, sphere) = (
         by_texel(&scene, spot.direct()),
         by_texel(&scene, sphere.direct()),
@@ -311,7 +338,13 @@ fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
 fn directional_light_enters_through_outside_openings_only() {
     let closed = assembled(&level());
     let frame = solved(&closed, &[GOOD_DIRECTIONAL], Bounces::Count(2));
-    assert!(frame.direct().iter().chain(frame.indirect()).all(|&e| e == 0.0));
+    assert!(
+        frame
+            .direct()
+            .iter()
+            .chain(frame.indirect())
+            .all(|&e| e == 0.0)
+    );
 
     let open = assembled(&level_with_a_door_outside());
     let frame = solved(&open, &[GOOD_DIRECTIONAL], Bounces::Count(1));
@@ -348,7 +381,10 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
             // Block 0 sees the door through block 1, whose sides are open or in one plane with the door's.
             let expected = if lit { 5.0 * cosine } else { 0.0 };
             let found = f64::from(direct[texel][0]);
-            assert!((found - expected).abs() < 1e-5, "block {block}: {found} {expected}");
+            assert!(
+                (found - expected).abs() < 1e-5,
+                "block {block}: {found} {expected}"
+            );
         }
     }
     assert!(scene.blocks[1].shape.is_open(Face::PosX));

@@ -1,23 +1,16 @@
-//! Bytes and text from anywhere: every fault has a name, and nothing panics.
+//! Dictionary bytes from anywhere: every fault has a name, and nothing panics.
 
 mod common;
 
 use common::{DEFAULT_BYTES, Random, default_dictionary, floor_plan};
-use glam::{DVec3, Vec3};
 use mrt_core::container::{ByteBudget, ContainerError, Format, Writer};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::HexahedronError;
 use mrt_core::matrix::Matrix;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
 use mrt_runtime::dictionary::{Dictionary, InterfaceOperators, ShapeOperators};
 use mrt_runtime::dictionary_file::{
     DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_RESOLUTION,
 };
-use mrt_runtime::level::{Connection, Level, LevelError, Opening};
-use mrt_runtime::level_text::{LevelTextError, from_text, to_text};
 use mrt_runtime::shape::SHAPES;
-use proptest::prelude::*;
-use proptest::test_runner::{Config, RngSeed};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
     Dictionary::from_bytes(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
@@ -25,9 +18,8 @@ fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
 
 /// A dictionary of two shapes with 2² texels and two modes of everything.
 fn small() -> Dictionary {
-    let filled = |rows, columns| {
-        Matrix::from_fn(rows, columns, |i, j| (1 + i + 3 * j) as f32 * 0.01)
-    };
+    let filled =
+        |rows, columns| Matrix::from_fn(rows, columns, |i, j| (1 + i + 3 * j) as f32 * 0.01);
     let shapes = SHAPES[..2]
         .iter()
         .map(|shape| {
@@ -138,7 +130,10 @@ fn truncated_dictionaries_are_refused() {
     let bytes = small().to_bytes().expect("it fits");
     for length in 0..bytes.len() {
         let error = read(&bytes[..length]).expect_err("cut");
-        assert!(matches!(error, DictionaryError::Container(_)), "{length}: {error}");
+        assert!(
+            matches!(error, DictionaryError::Container(_)),
+            "{length}: {error}"
+        );
     }
     let mut random = Random(1);
     for _ in 0..200 {
@@ -152,7 +147,12 @@ fn truncated_dictionaries_are_refused() {
 
 #[test]
 fn an_empty_or_foreign_file_is_not_of_this_kind() {
-    for foreign in [&b""[..], b"\x89PNG\r\n\x1a\n rest", &[0; 4096], b"format = \"mrt-level\""] {
+    for foreign in [
+        &b""[..],
+        b"\x89PNG\r\n\x1a\n rest",
+        &[0; 4096],
+        b"format = \"mrt-level\"",
+    ] {
         let error = read(foreign).expect_err("no dictionary");
         let foreign = matches!(
             error,
@@ -170,7 +170,10 @@ fn every_flipped_bit_is_noticed() {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << bit;
             let error = read(&damaged).expect_err("one bit is wrong");
-            assert!(matches!(error, DictionaryError::Container(_)), "{at}.{bit}: {error}");
+            assert!(
+                matches!(error, DictionaryError::Container(_)),
+                "{at}.{bit}: {error}"
+            );
         }
     }
     let mut random = Random(2);
@@ -195,7 +198,11 @@ fn another_version_is_refused_by_its_number() {
     let error = read(&writer.finish()).expect_err("too new");
     let version = matches!(
         error,
-        DictionaryError::Container(ContainerError::UnsupportedVersion { found: 2, newest: 1, .. })
+        DictionaryError::Container(ContainerError::UnsupportedVersion {
+            found: 2,
+            newest: 1,
+            ..
+        })
     );
     assert!(version, "{error}");
 }
@@ -217,7 +224,9 @@ fn absurd_sizes_are_refused_by_name() {
             let mut sizes = vec![2; 4];
             sizes[k] = size;
             match read(&with("sizes", Section::Sizes(sizes))).expect_err("absurd") {
-                DictionaryError::Size { what: named, found, .. } => {
+                DictionaryError::Size {
+                    what: named, found, ..
+                } => {
                     assert_eq!((named, found), (what, size as usize));
                 }
                 other => panic!("{what} {size}: {other}"),
@@ -226,7 +235,10 @@ fn absurd_sizes_are_refused_by_name() {
     }
     let no_modes = with("0.sigma", Section::Numbers(Vec::new()));
     let error = read(&no_modes).expect_err("no modes");
-    assert!(matches!(error, DictionaryError::Size { found: 0, .. }), "{error}");
+    assert!(
+        matches!(error, DictionaryError::Size { found: 0, .. }),
+        "{error}"
+    );
 }
 
 #[test]
@@ -249,7 +261,10 @@ fn sections_of_the_wrong_length_or_type_are_refused() {
             match read(&with(name, section)) {
                 // The number of modes follows from `sigma`, so another matrix is then the wrong one.
                 Err(DictionaryError::Length { section, .. }) => {
-                    assert!(section == name || name.ends_with("sigma"), "{name}: {section}");
+                    assert!(
+                        section == name || name.ends_with("sigma"),
+                        "{name}: {section}"
+                    );
                 }
                 // Other modes than the matrices have, down to none.
                 Err(DictionaryError::Size { .. }) if name.ends_with("sigma") => {}
@@ -257,7 +272,10 @@ fn sections_of_the_wrong_length_or_type_are_refused() {
             }
         }
         let error = read(&with(name, other)).expect_err("another type");
-        assert!(matches!(error, DictionaryError::Container(_)), "{name}: {error}");
+        assert!(
+            matches!(error, DictionaryError::Container(_)),
+            "{name}: {error}"
+        );
     }
 }
 
@@ -297,13 +315,19 @@ fn numbers_that_are_none_are_refused() {
 #[test]
 fn unknown_and_repeated_shapes_are_refused() {
     let error = read(&with("0.name", Section::Text("sphere"))).expect_err("unknown");
-    assert!(matches!(error, DictionaryError::UnknownShape { index: 0, .. }), "{error}");
+    assert!(
+        matches!(error, DictionaryError::UnknownShape { index: 0, .. }),
+        "{error}"
+    );
     assert!(error.to_string().contains("`sphere`"), "{error}");
     let mut twice = small();
     twice.shapes[0] = twice.shapes[1].clone();
     let bytes = twice.to_bytes().expect("it fits");
     let error = read(&bytes).expect_err("twice");
-    assert!(matches!(error, DictionaryError::ShapeTwice { found: "dead_end" }), "{error}");
+    assert!(
+        matches!(error, DictionaryError::ShapeTwice { found: "dead_end" }),
+        "{error}"
+    );
 }
 
 #[test]
@@ -337,245 +361,11 @@ fn a_dictionary_that_lacks_a_shape_says_which() {
     let error = assemble(&level, &packed, &AssembleConfig::default()).expect_err("incomplete");
     let missing = matches!(
         error,
-        AssembleError::MissingShape { block: 1, shape: "straight", .. }
+        AssembleError::MissingShape {
+            block: 1,
+            shape: "straight",
+            ..
+        }
     );
     assert!(missing, "{error}");
-}
-
-/// Two dead ends that face each other.
-fn pair() -> Level {
-    floor_plan(&[[0, 0], [1, 0]], 0.5)
-}
-
-/// The first fault of [`pair`] after a change.
-fn fault(change: impl FnOnce(&mut Level)) -> LevelError {
-    let mut level = pair();
-    change(&mut level);
-    let error = level.check().expect_err("the level is faulty");
-    // Assembly finds the same, and text that was written says so when it is read.
-    let assembled = assemble(&level, default_dictionary(), &AssembleConfig::default());
-    // NaN is not equal to itself.
-    let same = |other: &LevelError| other.to_string() == error.to_string();
-    assert!(matches!(assembled, Err(AssembleError::Level(other)) if same(&other)));
-    error
-}
-
-#[test]
-fn geometry_that_makes_no_sense_has_a_name() {
-    let overlap = fault(|level| {
-        level.connections.clear();
-        let corners = &mut level.blocks[1].warp.corners;
-        *corners = corners.map(|c| c - DVec3::X * 0.3);
-    });
-    assert!(matches!(overlap, LevelError::Overlap { a: 0, b: 1, .. }), "{overlap}");
-    for (what, change) in [
-        ("folded", (|c| *c = -*c - DVec3::X * 3.0) as fn(&mut DVec3)),
-        ("mirrored", |c| c.x = -c.x),
-        ("flat", |c| c.y = 0.5),
-        ("all in one point", |c| *c = DVec3::ZERO),
-        ("huge", |c| *c *= 1e150),
-        ("tiny", |c| *c *= 1e-150),
-    ] {
-        let error = fault(|level| level.blocks[0].warp.corners.iter_mut().for_each(change));
-        let named = matches!(
-            error,
-            LevelError::Warp { block: 0, source: HexahedronError::Folded { .. } }
-        );
-        assert!(named, "{what}: {error}");
-    }
-    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let error = fault(|level| level.blocks[1].warp.corners[3].z = bad);
-        let named = matches!(
-            error,
-            LevelError::Warp { block: 1, source: HexahedronError::NotFinite { corner: 3 } }
-        );
-        assert!(named, "{error}");
-    }
-    for bad in [f32::NAN, -0.1, 1.01, f32::INFINITY] {
-        let error = fault(|level| level.blocks[1].albedo[2].y = bad);
-        let named = matches!(error, LevelError::Albedo { block: 1, face: Face::NegY, .. });
-        assert!(named, "{error}");
-    }
-    let mut empty = pair();
-    empty.blocks.clear();
-    empty.connections.clear();
-    assert_eq!(empty.check(), Err(LevelError::Empty));
-}
-
-#[test]
-fn connections_that_make_no_sense_have_a_name() {
-    let connect = |a: (usize, Face), b: (usize, Face)| Connection {
-        a: Opening { block: a.0, face: a.1 },
-        b: Opening { block: b.0, face: b.1 },
-    };
-    let (right, left) = ((0, Face::PosX), (1, Face::NegX));
-    for block in [2, usize::MAX] {
-        let error = fault(|level| level.connections[0] = connect(right, (block, Face::NegX)));
-        let named = matches!(
-            error,
-            LevelError::NoSuchBlock { connection: 0, expected: 2, found } if found == block
-        );
-        assert!(named, "{error}");
-    }
-    for again in [connect(right, left), connect(left, right)] {
-        let error = fault(|level| level.connections.push(again));
-        assert!(matches!(error, LevelError::ConnectedTwice { found: 2, .. }), "{error}");
-    }
-    let error = fault(|level| level.connections[0] = connect(right, right));
-    assert!(matches!(error, LevelError::ConnectedTwice { block: 0, .. }), "{error}");
-    for wall in [Face::NegX, Face::PosY, Face::NegZ] {
-        let error = fault(|level| level.connections[0] = connect((0, wall), left));
-        let named = matches!(
-            error,
-            LevelError::NotAnOpening { block: 0, face, .. } if face == wall
-        );
-        assert!(named, "{error}");
-    }
-    let apart = fault(|level| {
-        let corners = &mut level.blocks[1].warp.corners;
-        *corners = corners.map(|c| c + DVec3::X * 0.01);
-    });
-    assert!(matches!(apart, LevelError::InterfaceMismatch { .. }), "{apart}");
-    let smaller = fault(|level| {
-        let corners = &mut level.blocks[1].warp.corners;
-        *corners = corners.map(|c| (c - DVec3::X) * 0.5 + DVec3::X);
-    });
-    assert!(matches!(smaller, LevelError::InterfaceMismatch { .. }), "{smaller}");
-}
-
-#[test]
-fn rolled_interfaces_are_refused() {
-    // About the corridor's axis: the openings stay where they are, up does not.
-    for (x, y) in [(Face::NegX, Face::PosZ), (Face::NegX, Face::NegY), (Face::NegX, Face::NegZ)] {
-        let mut level = pair();
-        level.blocks[1].orientation = CubeRotation::from_images(x, y).expect("perpendicular");
-        assert_eq!(level.check(), Ok(()));
-        let error = assemble(&level, default_dictionary(), &AssembleConfig::default())
-            .expect_err("rolled");
-        let named = matches!(
-            error,
-            AssembleError::RolledInterface { block: 0, other: 1, .. }
-        );
-        assert!(named, "{error}");
-    }
-}
-
-/// What mutations of level text put in.
-const TOKENS: [&str; 24] = [
-    "", "-1", "0", "1e400", "nan", "inf", "18446744073709551615", "-0.0", "\"\"", "[", "]", "[[block]]",
-    "{", "}", "=", "\"-x\"", "\"cross\"", "\"+y+x\"", "\"+x+x\"", "\u{0}", "🙂", "'", "\n", "#",
-];
-
-#[derive(Clone, Debug)]
-enum Mutation {
-    Delete(prop::sample::Index),
-    Duplicate(prop::sample::Index),
-    Replace(prop::sample::Index, usize),
-    Swap(prop::sample::Index, prop::sample::Index),
-    Cut(prop::sample::Index),
-}
-
-fn mutation() -> impl Strategy<Value = Mutation> {
-    let index = any::<prop::sample::Index>;
-    prop_oneof![
-        index().prop_map(Mutation::Delete),
-        index().prop_map(Mutation::Duplicate),
-        (index(), 0..TOKENS.len()).prop_map(|(i, t)| Mutation::Replace(i, t)),
-        (index(), index()).prop_map(|(a, b)| Mutation::Swap(a, b)),
-        index().prop_map(Mutation::Cut),
-    ]
-}
-
-/// Words, blanks and single signs; together they are the text.
-fn tokens(text: &str) -> Vec<String> {
-    let kind = |c: char| match c {
-        c if c.is_alphanumeric() || "+-._".contains(c) => 0,
-        c if c.is_whitespace() => 1,
-        _ => 2,
-    };
-    let mut tokens: Vec<String> = Vec::new();
-    let mut last = None;
-    for c in text.chars() {
-        match tokens.last_mut() {
-            Some(token) if last == Some(kind(c)) && kind(c) != 2 => token.push(c),
-            _ => tokens.push(c.to_string()),
-        }
-        last = Some(kind(c));
-    }
-    tokens
-}
-
-fn sound_text() -> String {
-    let mut level = floor_plan(&[[0, 0], [1, 0], [1, 1], [2, 0]], 0.5);
-    level.blocks[2].albedo[2] = Vec3::new(0.1, 0.2, 0.3);
-    to_text(&level).expect("levels have text")
-}
-
-proptest! {
-    #![proptest_config(Config {
-        cases: 4000,
-        rng_seed: RngSeed::Fixed(7),
-        failure_persistence: None,
-        ..Config::default()
-    })]
-
-    #[test]
-    fn mutated_level_text_never_panics(mutations in prop::collection::vec(mutation(), 1..6)) {
-        let mut tokens = tokens(&sound_text());
-        for mutation in mutations {
-            if tokens.is_empty() {
-                break;
-            }
-            let n = tokens.len();
-            match mutation {
-                Mutation::Delete(i) => {
-                    tokens.remove(i.index(n));
-                }
-                Mutation::Duplicate(i) => {
-                    let token = tokens[i.index(n)].clone();
-                    tokens.insert(i.index(n), token);
-                }
-                Mutation::Replace(i, token) => TOKENS[token].clone_into(&mut tokens[i.index(n)]),
-                Mutation::Swap(a, b) => tokens.swap(a.index(n), b.index(n)),
-                Mutation::Cut(i) => tokens.truncate(i.index(n)),
-            }
-        }
-        // What is still a level must pass all that follows.
-        if let Ok(level) = from_text(&tokens.concat()) {
-            prop_assert_eq!(level.check(), Ok(()));
-            let text = to_text(&level).expect("a sound level has text");
-            prop_assert_eq!(from_text(&text).expect("and is read again"), level.clone());
-            if level.blocks.len() <= 8 {
-                match assemble(&level, default_dictionary(), &AssembleConfig { max_depth: 2 }) {
-                    Ok(_) | Err(AssembleError::RolledInterface { .. }) => {}
-                    Err(other) => prop_assert!(false, "{}", other),
-                }
-            }
-        }
-    }
-}
-
-#[test]
-fn text_that_is_no_level_says_why() {
-    let sound = sound_text();
-    let error = |text: &str| from_text(text).expect_err("not a level");
-    assert!(matches!(error(""), LevelTextError::Malformed(_)));
-    assert!(matches!(error(&sound[..sound.len() / 2]), LevelTextError::Malformed(_)));
-    let replaced = |from: &str, to: &str| {
-        assert!(sound.contains(from), "{from}");
-        error(&sound.replacen(from, to, 1))
-    };
-    let foreign = replaced("\"mrt-level\"", "\"mrt-mesh\"");
-    assert!(matches!(foreign, LevelTextError::NotALevel { .. }), "{foreign}");
-    let version = replaced("version = 1", "version = 2");
-    assert!(matches!(version, LevelTextError::UnsupportedVersion { found: 2 }), "{version}");
-    let shape = replaced("\"dead_end\"", "\"dead end\"");
-    assert!(matches!(shape, LevelTextError::UnknownShape { .. }), "{shape}");
-    let face = replaced("\"+x\"", "\"x\"");
-    assert!(matches!(face, LevelTextError::UnknownFace { .. }), "{face}");
-    let placement = replaced("cell =", "box = [[0, 0, 0], [1, 1, 1]]\ncell =");
-    assert!(matches!(placement, LevelTextError::Placement { found: 2, .. }), "{placement}");
-    let unknown = replaced("cell =", "colour = 3\ncell =");
-    assert!(matches!(unknown, LevelTextError::Malformed(_)), "{unknown}");
-    assert!(unknown.to_string().contains("colour"), "{unknown}");
 }

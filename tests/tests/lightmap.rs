@@ -10,8 +10,8 @@ use mrt_runtime::level::Level;
 use mrt_runtime::scene::{Beyond, Scene};
 use mrt_runtime::visibility::Openings;
 
-/// A loop, a dead end and a junction: blocks of several orientations are joined.
-const CELLS: [[i32; 2]; 9] = [
+/// A loop, a junction and a room of 2x2: blocks of several orientations are joined, around pillars and not.
+const CELLS: [[i32; 2]; 12] = [
     [0, 0],
     [1, 0],
     [2, 0],
@@ -21,10 +21,17 @@ const CELLS: [[i32; 2]; 9] = [
     [1, 2],
     [2, 2],
     [3, 1],
+    [3, 2],
+    [4, 1],
+    [4, 2],
 ];
 
 fn lit() -> (Level, Scene, Frame) {
-    let level = floor_plan(&CELLS, 0.7);
+    let mut level = floor_plan(&CELLS, 0.7);
+    // A door that is closed, between blocks that are still joined around it.
+    level
+        .connections
+        .retain(|c| (c.a.block, c.b.block) != (9, 11));
     let scene = assembled(&level);
     let light = sphere(Vec3::new(1.8, 0.4, 0.6), 0.1, Vec3::new(1.0, 2.0, 4.0));
     let frame = solved(&scene, &[light], Bounces::Count(3));
@@ -33,7 +40,11 @@ fn lit() -> (Level, Scene, Frame) {
 
 fn walls(scene: &Scene) -> Vec<(usize, Face)> {
     let of = |(index, block): (usize, &mrt_runtime::scene::SceneBlock)| {
-        block.shape.walls().map(move |face| (index, face)).collect::<Vec<_>>()
+        block
+            .shape
+            .walls()
+            .map(move |face| (index, face))
+            .collect::<Vec<_>>()
     };
     scene.blocks.iter().enumerate().flat_map(of).collect()
 }
@@ -47,7 +58,14 @@ fn look_up(scene: &Scene, frame: &Frame, block: usize, face: Face, u: f64, v: f6
 }
 
 /// A texel of a canonical wall.
-fn texel(scene: &Scene, frame: &Frame, block: usize, face: Face, row: usize, column: usize) -> [f32; 3] {
+fn texel(
+    scene: &Scene,
+    frame: &Frame,
+    block: usize,
+    face: Face,
+    row: usize,
+    column: usize,
+) -> [f32; 3] {
     let offset = scene.blocks[block]
         .shape
         .wall_offset(face, scene.resolution)
@@ -62,7 +80,9 @@ fn on_face(face: Face, unit: DVec3) -> (f64, f64) {
 
 /// The sides of a wall, other than the faces it is parallel to.
 fn sides(face: Face) -> impl Iterator<Item = Face> {
-    Face::ALL.into_iter().filter(move |side| side.axis() != face.axis())
+    Face::ALL
+        .into_iter()
+        .filter(move |side| side.axis() != face.axis())
 }
 
 /// The point at `along` in [0, 1] of the edge between two faces.
@@ -150,7 +170,10 @@ fn joined_walls_meet_without_a_step() {
             }
         }
     }
-    println!("{edges} edges, largest step {:.1e} of the brightest", step / brightest);
+    println!(
+        "{edges} edges, largest step {:.1e} of the brightest",
+        step / brightest
+    );
     assert!(edges > 40, "{edges}");
     assert!(step <= ROUNDING * brightest, "{step}");
 }
@@ -168,11 +191,17 @@ fn light_is_continuous_on_the_way_across_an_opening() {
         let first = (corner.y as usize - 1) * width + corner.x as usize - 1;
         for k in 0..tile * (tile - 1) {
             let (along, across) = (k % tile, k / tile);
-            let rows = (first + across * width + along, first + (across + 1) * width + along);
-            let columns = (first + along * width + across, first + along * width + across + 1);
+            let rows = (
+                first + across * width + along,
+                first + (across + 1) * width + along,
+            );
+            let columns = (
+                first + along * width + across,
+                first + along * width + across + 1,
+            );
             for (a, b) in [rows, columns] {
-                for c in 0..3 {
-                    largest_difference = largest_difference.max((map[a][c] - map[b][c]).abs());
+                for (a, b) in map[a].into_iter().zip(map[b]) {
+                    largest_difference = largest_difference.max((a - b).abs());
                 }
             }
         }
@@ -203,7 +232,11 @@ fn light_is_continuous_on_the_way_across_an_opening() {
                 let (u, v) = on_face(other_wall, after);
                 let theirs = look_up(&scene, &frame, there, other_wall, u, v);
                 for (a, b) in ours.into_iter().zip(theirs) {
-                    assert!((a - b).abs() <= bound, "{} of at most {bound}", (a - b).abs());
+                    assert!(
+                        (a - b).abs() <= bound,
+                        "{} of at most {bound}",
+                        (a - b).abs()
+                    );
                 }
             }
         }
@@ -227,7 +260,8 @@ fn creases_and_outside_openings_repeat_the_edge() {
                 continue;
             }
             outside += usize::from(beyond == Beyond::Outside);
-            for row in 0..scene.resolution {
+            // The outermost texels show what is around a pillar, if there is one.
+            for row in 1..scene.resolution - 1 {
                 let along = (row as f64 + 0.5) / scene.resolution as f64;
                 let edge = edge_point(face, side, along);
                 let (u, v) = on_face(face, edge);
@@ -237,7 +271,10 @@ fn creases_and_outside_openings_repeat_the_edge() {
             }
         }
     }
-    assert_eq!(outside, 7, "three walls of a corner and four of a corridor end at the door");
+    assert_eq!(
+        outside, 7,
+        "three walls of a corner and four of a corridor end at the door"
+    );
 }
 
 #[test]
@@ -245,7 +282,10 @@ fn coordinates_outside_a_wall_are_clamped_and_openings_have_none() {
     let (_, scene, _) = lit();
     let opening = scene.blocks[0].shape.openings[0];
     assert_eq!(scene.atlas.pixel(0, opening, 0.5, 0.5), None);
-    assert_eq!(scene.atlas.pixel(scene.blocks.len(), Face::NegY, 0.5, 0.5), None);
+    assert_eq!(
+        scene.atlas.pixel(scene.blocks.len(), Face::NegY, 0.5, 0.5),
+        None
+    );
     let inside = scene.atlas.pixel(0, Face::NegY, 1.0, 0.0);
     assert_eq!(scene.atlas.pixel(0, Face::NegY, 7.0, -3.0), inside);
     let uv = scene

@@ -250,14 +250,3 @@ fn feedback_over_frames_tends_to_all_bounces() {
     }
     assert!(before < 1e-5, "{before}");
 }
-
-#[test]
-fn tmp_column_sums() {
-    let closed = closed_cube_bounce(16, Reconstruction::Constant, &Progress::silent()).expect("x");
-    let mut worst = (0.0f64, 9.0f64);
-    for j in 0..closed.columns() {
-        let sum: f64 = closed.column(j).iter().sum();
-        worst = (worst.0.max(sum), worst.1.min(sum));
-    }
-    println!("TMP column sums {worst:?}");
-}

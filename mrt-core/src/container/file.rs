@@ -57,9 +57,9 @@ pub fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ContainerE
             .create(true)
             .truncate(true)
             .open(&temporary)
-            .map_err(io_error(&temporary))?;
-        file.write_all(bytes).map_err(io_error(&temporary))?;
-        file.sync_all().map_err(io_error(&temporary))?;
+            .map_err(io_error(path))?;
+        file.write_all(bytes).map_err(io_error(path))?;
+        file.sync_all().map_err(io_error(path))?;
         drop(file);
         fs::rename(&temporary, path).map_err(io_error(path))
     };

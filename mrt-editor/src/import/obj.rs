@@ -29,9 +29,11 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
         ignore_lines: true,
         ..LoadOptions::default()
     };
-    let loaded = tobj::load_obj_buf(&mut BufReader::with_capacity(1, &mut lines), &options, |_| {
-        Ok((Vec::new(), HashMap::new()))
-    });
+    let loaded = tobj::load_obj_buf(
+        &mut BufReader::with_capacity(1, &mut lines),
+        &options,
+        |_| Ok((Vec::new(), HashMap::new())),
+    );
     let malformed = |expected| ImportError::Malformed {
         path: path.to_owned(),
         place: format!("line {}", lines.number),
@@ -228,9 +230,16 @@ mod tests {
             let error = read_text(text).expect_err("refused").to_string();
             assert!(error.contains("line 2"), "{text:?}: {error}");
         }
-        for text in ["v 0 0 0\nf 1 2 3\n", "v 0 0 0\nf 0 1 1\n", "v 0 0 0\nf 1 1 -9223372036854775808\n"] {
+        for text in [
+            "v 0 0 0\nf 1 2 3\n",
+            "v 0 0 0\nf 0 1 1\n",
+            "v 0 0 0\nf 1 1 -9223372036854775808\n",
+        ] {
             let error = read_text(text).expect_err("refused").to_string();
-            assert!(error.contains("face") || error.contains("line 2"), "{error}");
+            assert!(
+                error.contains("face") || error.contains("line 2"),
+                "{error}"
+            );
         }
     }
 

@@ -9,7 +9,7 @@ use mrt_runtime::atlas::AtlasLayout;
 use std::f32::consts::PI;
 
 /// Shadow rays to each light that are always cast.
-const FIRST_SHADOW_RAYS: u32 = 3;
+const FIRST_SHADOW_RAYS: u32 = 2;
 
 /// Shadow rays where the first disagree.
 const SHADOW_RAYS: u32 = 16;

@@ -1,0 +1,88 @@
+//! Why `mrt light` stops.
+
+use crate::dictionary_source::SourceError;
+use crate::import::ImportError;
+use crate::picture::file::WriteError;
+use glam::Vec3;
+use mrt_runtime::assemble::AssembleError;
+use mrt_runtime::frame::FrameError;
+use mrt_runtime::level_text::LevelTextError;
+use std::path::PathBuf;
+
+/// Why there are no pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum LightCommandError {
+    /// The mesh cannot be read.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The level's file cannot be read.
+    #[error("level {}: {source}", path.display())]
+    LevelFile {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// The level is faulty.
+    #[error("level {}: {source}", path.display())]
+    Level {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        source: LevelTextError,
+    },
+    /// There is no dictionary.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// Level and dictionary do not fit.
+    #[error(transparent)]
+    Assemble(#[from] AssembleError),
+    /// A light is refused.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A light is outside every block.
+    #[error(
+        "light {light} at {position} m lies in no block: {distance:.3} m outside block {block}, the \
+         nearest; expected a point inside the level"
+    )]
+    OutsideBlocks {
+        /// Which light.
+        light: usize,
+        /// Its position.
+        position: Vec3,
+        /// The nearest block.
+        block: usize,
+        /// Metres to it.
+        distance: f64,
+    },
+    /// A light is behind the mesh's faces.
+    #[error(
+        "light {light} at {position} m lies inside a wall: it sees the backs of faces in {backs:.0} % \
+         of all directions; expected a point in a room"
+    )]
+    InWall {
+        /// Which light.
+        light: usize,
+        /// Its position.
+        position: Vec3,
+        /// Share of directions, percent.
+        backs: f32,
+    },
+    /// Nowhere to put the default light.
+    #[error(
+        "no light was given and none of the level's blocks has free space at its centre; expected \
+         --light x,y,z,intensity"
+    )]
+    NoPlace,
+    /// The camera has no direction.
+    #[error("--camera {from};{to}: expected two different points")]
+    Camera {
+        /// Where it stands.
+        from: Vec3,
+        /// Where it looks.
+        to: Vec3,
+    },
+    /// The files cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
