@@ -19,7 +19,7 @@ use std::collections::HashMap;
 const ROUNDING: f64 = 1e-5;
 
 /// What an opening emits is sampled along rays. Where a ray meets the edge between two texels, rounding decides
-/// which one it sees, and decides differently at another opening of the same shape. Measured: 1.2e-4 for
+/// which one it sees, and probably decides differently at another opening of the same shape. Measured: 1.2e-4 for
 /// quarter turns, which exchange the openings of cross blocks, 3.7e-5 for a mirrored corridor.
 const GRID: f64 = 5e-4;
 

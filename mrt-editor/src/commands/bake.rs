@@ -8,7 +8,7 @@ use mrt_dictionary::progress::Cancelled;
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::dictionary_file::DictionaryError;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Bakes a dictionary of canonical shapes; the same settings give the same bytes.
@@ -66,6 +66,14 @@ pub enum BakeError {
     /// The dictionary has no form as bytes.
     #[error(transparent)]
     Dictionary(#[from] DictionaryError),
+    /// There is nowhere to write.
+    #[error("cannot write {file}: found no folder {found}; expected one that exists")]
+    NoFolder {
+        /// The file to write.
+        file: String,
+        /// Where it would be.
+        found: String,
+    },
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] ContainerError),
@@ -103,6 +111,7 @@ struct ShapeReport {
 /// [`BakeError`]; the file is then as it was.
 pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
     let config = config(args)?;
+    check_folder(&args.out)?;
     let start = Instant::now();
     let dictionary = bake_with_progress(&config)?;
     let bytes = dictionary.to_bytes()?;
@@ -119,6 +128,22 @@ pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
         print(&report);
     }
     Ok(())
+}
+
+/// A bake takes long; a folder that is not there should not be found out at its end.
+fn check_folder(file: &Path) -> Result<(), BakeError> {
+    let folder = match file.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    };
+    if folder.is_dir() {
+        Ok(())
+    } else {
+        Err(BakeError::NoFolder {
+            file: file.display().to_string(),
+            found: folder.display().to_string(),
+        })
+    }
 }
 
 fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {

@@ -80,8 +80,13 @@ pub enum DemoError {
         source: std::io::Error,
     },
     /// The level is at fault.
-    #[error(transparent)]
-    Level(#[from] LevelTextError),
+    #[error("{place}: {source}")]
+    Level {
+        /// The file, or "the built-in maze".
+        place: String,
+        /// What is wrong.
+        source: LevelTextError,
+    },
     /// Level and dictionary do not fit.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
@@ -157,14 +162,17 @@ pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
 }
 
 fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
-    let Some(path) = &args.level else {
-        return Ok(from_text(MAZE)?);
+    let (place, text) = match &args.level {
+        None => ("the built-in maze".to_owned(), MAZE.to_owned()),
+        Some(path) => {
+            let file = path.display().to_string();
+            match std::fs::read_to_string(path) {
+                Ok(text) => (file, text),
+                Err(source) => return Err(DemoError::LevelFile { file, source }),
+            }
+        }
     };
-    let text = std::fs::read_to_string(path).map_err(|source| DemoError::LevelFile {
-        file: path.display().to_string(),
-        source,
-    })?;
-    Ok(from_text(&text)?)
+    from_text(&text).map_err(|source| DemoError::Level { place, source })
 }
 
 /// A warm light in the first block and a cool one in a block far from it.

@@ -36,6 +36,9 @@ use std::time::Instant;
 /// A light's radius where none is given, in widths of its block: 1.6 texels of the standard dictionary.
 const LIGHT_RADIUS: f64 = 0.1;
 
+/// Colours that default lights take in turn, warm and cool, so that one sees whose light is where.
+const DEFAULT_TINTS: [Vec3; 2] = [Vec3::new(1.0, 0.85, 0.65), Vec3::new(0.7, 0.85, 1.0)];
+
 /// Lights placed when none is given: one for this many blocks, up to the most.
 const BLOCKS_A_LIGHT: usize = 12;
 const MOST_DEFAULT_LIGHTS: usize = 6;
@@ -173,14 +176,18 @@ fn place_lights(
         if places.is_empty() {
             return Err(LightCommandError::NoPlace);
         }
-        let lights = places.into_iter().map(|(block, position)| SphereLight {
-            position,
-            radius: args
-                .light_radius
-                .unwrap_or((LIGHT_RADIUS * width(block)) as f32),
-            // About 1 W/m² on the walls of its block.
-            intensity: Vec3::splat((0.25 * width(block) * width(block)) as f32),
-        });
+        let lights = places
+            .into_iter()
+            .enumerate()
+            .map(|(index, (block, position))| SphereLight {
+                position,
+                radius: args
+                    .light_radius
+                    .unwrap_or((LIGHT_RADIUS * width(block)) as f32),
+                // About 1 W/m² on the walls of its block.
+                intensity: DEFAULT_TINTS[index % DEFAULT_TINTS.len()]
+                    * (0.25 * width(block) * width(block)) as f32,
+            });
         return Ok(lights.collect());
     }
     let mut lights = Vec::with_capacity(args.light.len());
