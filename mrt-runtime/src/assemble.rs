@@ -4,7 +4,7 @@ use crate::atlas::AtlasLayout;
 use crate::dictionary::{Dictionary, InterfaceOperators};
 use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::propagate;
-use crate::scene::{Beyond, Interface, Scene, SceneBlock, SceneShape};
+use crate::scene::{Beyond, Interface, Portal, Scene, SceneBlock, SceneShape};
 use crate::shape::Shape;
 use glam::DVec3;
 use mrt_core::block_sparse::BlockSparse;
@@ -158,11 +158,14 @@ fn place_blocks(
                 }
             };
         }
+        let warp = block.canonical_warp();
+        let portals = block.shape.openings.iter();
         blocks.push(SceneBlock {
             shape_index,
             shape: block.shape,
             orientation: block.orientation,
-            warp: block.canonical_warp(),
+            portals: portals.map(|&face| Portal::new(&warp, face)).collect(),
+            warp,
             beyond,
             texels: texel..texel + texels,
             coefficients: coefficient..coefficient + modes,

@@ -56,6 +56,36 @@ pub struct SceneBlock {
     pub coefficients: Range<usize>,
     /// Connected openings, through which light of other blocks comes in.
     pub interfaces: Vec<Interface>,
+    /// All openings as loops in the world, in the order of the shape's list.
+    pub portals: Vec<Portal>,
+}
+
+/// An opening's outline in the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Portal {
+    /// The canonical face.
+    pub face: Face,
+    /// Four corners in a loop that runs clockwise seen from inside the block, metres.
+    pub corners: [DVec3; 4],
+    /// Out of the block, at the first corner; not of unit length.
+    pub outward: DVec3,
+}
+
+impl Portal {
+    /// The outline of a canonical face of a warped cube.
+    pub(crate) fn new(warp: &Hexahedron, face: Face) -> Self {
+        let mut corners = warp.face_corners(face);
+        let turn = |c: &[DVec3; 4]| (c[1] - c[0]).cross(c[3] - c[0]);
+        let middle = corners.iter().copied().sum::<DVec3>() / 4.0;
+        if turn(&corners).dot(middle - warp.center()) < 0.0 {
+            corners.reverse();
+        }
+        Self {
+            face,
+            corners,
+            outward: turn(&corners),
+        }
+    }
 }
 
 /// A connected opening seen from inside.

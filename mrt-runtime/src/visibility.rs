@@ -1,6 +1,6 @@
 //! Shadows of direct light: by the level's openings, or by rays of the caller's.
 
-use crate::scene::{Beyond, Scene};
+use crate::scene::{Beyond, Portal, Scene};
 use glam::DVec3;
 
 /// A surface point that asks for light.
@@ -84,16 +84,10 @@ fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
             return true;
         }
         let block = &scene.blocks[here];
-        let exit = block.shape.openings.iter().copied().find(|&face| {
-            Some(face) != entered
-                && leaves_through(
-                    &block.warp.face_corners(face),
-                    block.warp.center(),
-                    receiver.position,
-                    direction,
-                )
+        let exit = block.portals.iter().find(|portal| {
+            Some(portal.face) != entered && leaves_through(portal, receiver.position, direction)
         });
-        match exit.map(|face| block.beyond[face.index()]) {
+        match exit.map(|portal| block.beyond[portal.face.index()]) {
             Some(Beyond::Block { block, face, .. }) => {
                 here = block;
                 entered = Some(face);
@@ -105,20 +99,14 @@ fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
     false
 }
 
-/// True when the line from `origin` along `direction` passes the loop of four corners outwards, away
-/// from `inside`.
+/// True when the line from `origin` along `direction` passes the portal outwards.
 ///
 /// The line passes a loop when it runs on the same side of all four edges; that depends on the corners
 /// alone, so the blocks on both sides of an opening agree, bent openings included.
-fn leaves_through(corners: &[DVec3; 4], inside: DVec3, origin: DVec3, direction: DVec3) -> bool {
-    let middle = corners.iter().copied().sum::<DVec3>() / 4.0;
-    let turn = (corners[1] - corners[0]).cross(corners[3] - corners[0]);
-    let outward = turn.dot(middle - inside).signum();
-    if direction.dot(turn) * outward <= 0.0 {
+fn leaves_through(portal: &Portal, origin: DVec3, direction: DVec3) -> bool {
+    if direction.dot(portal.outward) <= 0.0 {
         return false;
     }
-    (0..4).all(|k| {
-        let (a, b) = (corners[k] - origin, corners[(k + 1) % 4] - origin);
-        a.cross(b).dot(direction) * outward >= 0.0
-    })
+    let corners = portal.corners.map(|corner| corner - origin);
+    (0..4).all(|k| corners[k].cross(corners[(k + 1) % 4]).dot(direction) >= 0.0)
 }
