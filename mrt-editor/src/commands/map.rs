@@ -4,7 +4,7 @@ use crate::import::{ImportConfig, ImportError, ImportReport, UpAxis, read_scene}
 use crate::map::paint::Coverage;
 use crate::map::voxels::Winding;
 use crate::map::{Fit, MapConfig, MapError, Mapped, map_mesh};
-use crate::picture::file::{WriteError, write_whole};
+use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_runtime::level_text::{LevelTextError, to_text};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -88,7 +88,7 @@ pub enum MapCommandError {
     Text(#[from] LevelTextError),
     /// The file cannot be written.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(#[from] ContainerError),
 }
 
 #[derive(Serialize)]
@@ -123,7 +123,7 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
         winding: args.winding,
     };
     let mapped = map_mesh(&scene.mesh, &config)?;
-    write_whole(&args.out, to_text(&mapped.level)?.as_bytes())?;
+    write_file_atomically(&args.out, to_text(&mapped.level)?.as_bytes())?;
     let report = Report::new(scene.report, &mapped, start);
     if args.json {
         // A struct of numbers and names always has a text.

@@ -2,11 +2,12 @@
 
 use super::View;
 use crate::picture::Picture;
-use crate::picture::file::{WriteError, write_hdr, write_png, write_whole};
+use crate::picture::file::{WriteError, write_hdr, write_png};
 use crate::picture::lit::LitScene;
 use crate::picture::tone::{auto_exposure, tone_map};
 use crate::receiver::unwrap::LitTriangle;
 use glam::Vec3;
+use mrt_core::container::write_file_atomically;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -69,9 +70,9 @@ fn write_files(
     write_png(&name("lightmap.png".to_owned()), size, &pixels)?;
     write_hdr(&name("lightmap.hdr".to_owned()), &lightmap)?;
     let obj = obj_text(lit, unwrapped);
-    write_whole(&name("mesh.obj".to_owned()), obj.as_bytes())?;
+    write_file_atomically(&name("mesh.obj".to_owned()), obj.as_bytes())?;
     let mtl = mtl_text(lit);
-    write_whole(&name("mesh.mtl".to_owned()), mtl.as_bytes())?;
+    write_file_atomically(&name("mesh.mtl".to_owned()), mtl.as_bytes())?;
     Ok(files)
 }
 
