@@ -185,7 +185,7 @@ mod tests {
     fn classes_split_a_signal_without_loss() {
         let classes = grid();
         let signal: Vec<f64> = (0..12).map(|k| f64::from(k * k % 7) - 2.5).collect();
-        let mut sum = vec![0.0; 12];
+        let mut sum = [0.0; 12];
         let mut energy = 0.0;
         let mut dimensions = 0;
         for class in 0..classes.class_count() {
