@@ -70,7 +70,9 @@ impl Hexahedron {
         let expected = 1e-6 * size * size * size;
         for corner in 0..8 {
             let found = self.jacobian(Self::unit_corner(corner)).determinant();
-            if found <= expected {
+            // Also true when huge coordinates make the determinant NaN.
+            let is_unfolded = found > expected;
+            if !is_unfolded {
                 return Err(HexahedronError::Folded {
                     corner,
                     expected,

@@ -121,6 +121,16 @@ pub fn whole_multiplets(singular_values: &[f64], modes: usize) -> usize {
         while kept > 0 && singular_values[kept - 1] - next <= MULTIPLET_TOLERANCE * next {
             kept -= 1;
         }
+        // The first multiplet stays even where it is larger than asked for: no modes are no basis.
+        while kept == 0
+            || singular_values[0] - singular_values[kept]
+                <= MULTIPLET_TOLERANCE * singular_values[0]
+        {
+            kept += 1;
+            if kept == significant {
+                break;
+            }
+        }
     }
     kept
 }

@@ -6,6 +6,7 @@ pub mod dictionary_source;
 pub mod import;
 pub mod level_view;
 pub mod map;
+pub mod output;
 pub mod picture;
 pub mod receiver;
 pub mod reference_level;

@@ -101,6 +101,10 @@ pub struct Mapped {
 /// Why a mesh has no level.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
+    /// Zero blocks asked for.
+    #[error("--max-blocks 0; expected at least 1")]
+    NoBlocks,
+
     /// No point with a floor below and walls around.
     #[error(
         "the scene encloses no free space: found no point with a floor below and faces towards it on \
@@ -158,6 +162,9 @@ fn check(config: &MapConfig) -> Result<(), MapError> {
         .filter(|&cell| !(cell.is_finite() && cell > 0.0))
     {
         return Err(MapError::Cell { found });
+    }
+    if config.max_blocks == 0 {
+        return Err(MapError::NoBlocks);
     }
     for (flag, found) in [
         ("--openness", config.openness),

@@ -16,12 +16,23 @@ use mrt_core::matrix::Matrix;
 pub struct AssembleConfig {
     /// Openings that light may cross, at most: `d_max`. Further blocks read 0 from the source.
     pub max_depth: usize,
+    /// Bytes that texels and `T_b->r` may take together.
+    pub max_bytes: usize,
 }
 
+/// Largest [`AssembleConfig::max_depth`]: rings of blocks would be followed for ever.
+pub const MAX_DEPTH: usize = 64;
+
+/// Bytes that positions, normals, albedo, frame buffers and lightmap take for a texel.
+const BYTES_PER_TEXEL: usize = 3 * 12 + 4 * 12 + 2 * 12;
+
 impl Default for AssembleConfig {
-    /// Eight openings: of what one-bounce light crosses that many, under 0.1 % arrives.
+    /// Eight openings and 2 GiB: of what one-bounce light crosses that many, under 0.1 % arrives.
     fn default() -> Self {
-        Self { max_depth: 8 }
+        Self {
+            max_depth: 8,
+            max_bytes: 2 << 30,
+        }
     }
 }
 
@@ -40,6 +51,22 @@ pub enum AssembleError {
         shape: &'static str,
         /// Shapes in the dictionary.
         expected: String,
+    },
+    /// More openings than paths are followed through.
+    #[error("light may cross {found} openings; expected at most {MAX_DEPTH}")]
+    Depth {
+        /// The depth given.
+        found: usize,
+    },
+    /// The operators would not fit.
+    #[error(
+        "the scene needs over {found} bytes; expected at most {expected} (AssembleConfig::max_bytes)"
+    )]
+    TooLarge {
+        /// [`AssembleConfig::max_bytes`].
+        expected: usize,
+        /// What it takes at least.
+        found: usize,
     },
     /// Two openings meet with their up directions turned or mirrored against each other.
     #[error(
@@ -72,9 +99,23 @@ pub fn assemble(
     config: &AssembleConfig,
 ) -> Result<Scene, AssembleError> {
     level.check()?;
+    if config.max_depth > MAX_DEPTH {
+        return Err(AssembleError::Depth {
+            found: config.max_depth,
+        });
+    }
     let used = used_shapes(level, dictionary)?;
     let blocks = place_blocks(level, dictionary, &used)?;
     let resolution = dictionary.resolution;
+    let texel_bytes = BYTES_PER_TEXEL * blocks.last().map_or(0, |b| b.texels.end);
+    let operator_bytes =
+        config
+            .max_bytes
+            .checked_sub(texel_bytes)
+            .ok_or(AssembleError::TooLarge {
+                expected: config.max_bytes,
+                found: texel_bytes,
+            })?;
     let mut scene = Scene {
         resolution,
         shapes: used
@@ -96,7 +137,7 @@ pub fn assemble(
     };
     place_texels(&mut scene, level);
     scene.response_from_coefficients =
-        propagate::response_from_coefficients(&scene, dictionary, &used, config.max_depth);
+        propagate::response_from_coefficients(&scene, dictionary, &used, config, operator_bytes)?;
     Ok(scene)
 }
 
@@ -165,6 +206,7 @@ fn place_blocks(
             shape: block.shape,
             orientation: block.orientation,
             portals: portals.map(|&face| Portal::new(&warp, face)).collect(),
+            bounds: warp.bounds(),
             warp,
             beyond,
             texels: texel..texel + texels,

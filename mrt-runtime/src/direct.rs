@@ -92,7 +92,13 @@ pub fn irradiance<V: Visibility>(
     if unshadowed == Vec3::ZERO {
         return Vec3::ZERO;
     }
-    unshadowed * visibility.fraction(scene, receiver, toward)
+    let fraction = visibility.fraction(scene, receiver, toward);
+    // Callers' functions may return anything: what is not a positive number lets no light through.
+    if fraction > 0.0 {
+        unshadowed * fraction.min(1.0)
+    } else {
+        Vec3::ZERO
+    }
 }
 
 /// Distance, metres, below which a light of smaller radius no longer gets brighter: it keeps products
@@ -105,6 +111,10 @@ fn bounded_irradiance(offset: DVec3, normal: DVec3, radius: f32) -> f32 {
 
 /// 1 within the inner angle, 0 beyond the outer one, smooth between.
 fn cone_falloff(from_light: DVec3, axis: DVec3, inner: f32, outer: f32) -> f32 {
+    // A receiver at the light's centre is in no direction from it, and gets no light anyway.
+    if from_light == DVec3::ZERO {
+        return 0.0;
+    }
     let angle = from_light.angle_between(axis) as f32;
     if angle <= inner {
         return 1.0;

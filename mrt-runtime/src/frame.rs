@@ -1,7 +1,7 @@
 //! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
 
 use crate::direct::direct_light;
-use crate::light::{Light, LightError, PlacedLight, place};
+use crate::light::{Light, LightError, MAX_LIGHT_VALUE, PlacedLight, place};
 use crate::scene::Scene;
 use crate::visibility::Visibility;
 use mrt_core::matrix::{MatrixView, multiply_add};
@@ -10,7 +10,10 @@ use std::time::{Duration, Instant};
 /// Lights in one frame, at most.
 pub const MAX_LIGHTS: usize = 1024;
 
-/// Which bounces a frame computes.
+/// Passes in one frame, at most: at albedo 0.99 the light left after them is 1e-18 of the first.
+pub const MAX_PASSES: u32 = 4096;
+
+/// Which bounces a frame computes; more than [`MAX_PASSES`] passes are not made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounces {
     /// This many, each a pass over the reduced operators; 0 leaves indirect light at zero.
@@ -60,7 +63,7 @@ impl StageTimes {
 ///
 /// Signals on texels are stored block by block, in a block channel by channel (red, green, blue), and in a
 /// channel texel by texel in the canonical shape's order.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Frame {
     lights: Vec<PlacedLight>,
     direct: Vec<f32>,
@@ -85,6 +88,19 @@ pub enum FrameError {
     TooManyLights {
         /// Lights given.
         found: usize,
+    },
+    /// Direct light from the caller has the wrong length, or values that are no irradiance.
+    #[error(
+        "direct light has {found} values, the first that is no irradiance at {faulty:?}; expected \
+         {expected} values in [0, {MAX_LIGHT_VALUE}]"
+    )]
+    Direct {
+        /// Three values a texel.
+        expected: usize,
+        /// Values given.
+        found: usize,
+        /// Position of the first that is negative, too large or NaN.
+        faulty: Option<usize>,
     },
     /// The buffers were made for a scene of another size.
     #[error("the frame's buffers hold {expected} {what}; the scene has {found}")]
@@ -135,28 +151,47 @@ impl Frame {
             ..StageTimes::default()
         };
         self.bounce(scene, bounces);
-        let start = Instant::now();
-        scene
-            .atlas
-            .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
-        self.times.atlas = start.elapsed();
+        self.fill_lightmap(scene);
         Ok(())
     }
 
     /// As [`Frame::solve`], for direct irradiance that the caller computed, in this struct's order.
     ///
-    /// # Panics
-    /// If the length is not three values a texel.
-    pub fn solve_from_direct(&mut self, scene: &Scene, direct: &[f32], bounces: Bounces) {
+    /// # Errors
+    /// [`FrameError::OtherScene`] and [`FrameError::Direct`]; the frame then holds what it held before.
+    pub fn solve_from_direct(
+        &mut self,
+        scene: &Scene,
+        direct: &[f32],
+        bounces: Bounces,
+    ) -> Result<(), FrameError> {
+        self.check_scene(scene)?;
+        let faulty = direct
+            .iter()
+            .position(|e| !(0.0..=MAX_LIGHT_VALUE).contains(e));
+        if direct.len() != self.direct.len() || faulty.is_some() {
+            return Err(FrameError::Direct {
+                expected: self.direct.len(),
+                found: direct.len(),
+                faulty,
+            });
+        }
         self.direct.copy_from_slice(direct);
         self.times = StageTimes::default();
         self.bounce(scene, bounces);
+        self.fill_lightmap(scene);
+        Ok(())
+    }
+
+    fn fill_lightmap(&mut self, scene: &Scene) {
+        let start = Instant::now();
         scene
             .atlas
             .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
+        self.times.atlas = start.elapsed();
     }
 
-    fn check(&mut self, scene: &Scene, lights: &[Light]) -> Result<(), FrameError> {
+    fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
         // Doors and shapes may differ where the number of texels does not.
         let pixels = scene.atlas.width * scene.atlas.height;
         for (what, expected, found) in [
@@ -177,14 +212,17 @@ impl Frame {
                 });
             }
         }
+        Ok(())
+    }
+
+    fn check(&mut self, scene: &Scene, lights: &[Light]) -> Result<(), FrameError> {
+        self.check_scene(scene)?;
         if lights.len() > MAX_LIGHTS {
             return Err(FrameError::TooManyLights {
                 found: lights.len(),
             });
         }
-        for (index, &light) in lights.iter().enumerate() {
-            place(scene, index, light)?;
-        }
+        // Read by this frame only, so a refused light may leave them incomplete.
         self.lights.clear();
         for (index, &light) in lights.iter().enumerate() {
             self.lights.push(place(scene, index, light)?);
@@ -194,12 +232,14 @@ impl Frame {
 
     fn bounce(&mut self, scene: &Scene, bounces: Bounces) {
         let (limit, tolerance) = match bounces {
-            Bounces::Count(count) => (count, None),
+            Bounces::Count(count) => (count.min(MAX_PASSES), None),
             Bounces::Feedback => (1, None),
-            Bounces::Converged { tolerance, limit } => (limit, Some(tolerance)),
+            Bounces::Converged { tolerance, limit } => (limit.min(MAX_PASSES), Some(tolerance)),
         };
         if bounces != Bounces::Feedback {
             self.indirect.fill(0.0);
+            self.coefficients.fill(0.0);
+            self.responses.fill(0.0);
         }
         self.passes = 0;
         while self.passes < limit {
@@ -247,8 +287,12 @@ impl Frame {
     }
 
     /// Indirect irradiance, RGB, of one texel of a block; the scene must be the one that was solved.
+    ///
+    /// # Panics
+    /// If the scene has no such block or the block no such texel.
     pub fn indirect_at(&self, scene: &Scene, block: usize, texel: usize) -> [f32; 3] {
         let range = &scene.blocks[block].texels;
+        assert!(texel < range.len(), "texel {texel} of {}", range.len());
         let start = 3 * range.start + texel;
         std::array::from_fn(|channel| self.indirect[start + channel * range.len()])
     }

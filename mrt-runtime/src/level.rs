@@ -11,6 +11,10 @@ pub const MAX_BLOCKS: usize = 100_000;
 /// Corners of joined faces must meet within this fraction of the block's diagonal.
 pub const JOIN_TOLERANCE: f64 = 1e-3;
 
+/// Coordinates may be at most this many diagonals of a block: texel positions in `f32` are then good to a
+/// thousandth of it, a fortieth of a texel at 16².
+pub const FAR_LIMIT: f64 = 1e4;
+
 /// Blocks may enter each other by this fraction of their smaller diagonal before they overlap.
 pub const OVERLAP_TOLERANCE: f64 = 1e-2;
 
@@ -140,6 +144,27 @@ pub enum LevelError {
         /// Largest distance accepted, metres.
         expected: f64,
         /// Largest distance between corners that should meet, metres.
+        found: f64,
+    },
+    /// Blocks whose bounding boxes overlap one another by the hundred.
+    #[error(
+        "blocks are packed so that each bounding box meets over {expected} others; expected fewer"
+    )]
+    TooCrowded {
+        /// Pairs a block that are tested.
+        expected: usize,
+    },
+    /// Too far from the origin for positions in single precision.
+    #[error(
+        "block {block}: a corner is {found:.3e} m from the origin along an axis; expected at most \
+         {expected:.3e} m, {FAR_LIMIT:.0e} of the block's diagonals"
+    )]
+    TooFar {
+        /// Which block.
+        block: usize,
+        /// Largest coordinate accepted, metres.
+        expected: f64,
+        /// Largest coordinate, metres.
         found: f64,
     },
     /// Two blocks share a volume.
@@ -285,6 +310,16 @@ impl Level {
                 block: index,
                 source,
             })?;
+            let (min, max) = block.warp.bounds();
+            let found = min.abs().max(max.abs()).max_element();
+            let expected = FAR_LIMIT * block.warp.diagonal();
+            if found > expected {
+                return Err(LevelError::TooFar {
+                    block: index,
+                    expected,
+                    found,
+                });
+            }
             for face in Face::ALL {
                 let albedo = block.albedo[face.index()];
                 let legal = albedo.to_array().iter().all(|a| (0.0..=1.0).contains(a));

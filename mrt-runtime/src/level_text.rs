@@ -101,6 +101,14 @@ pub enum LevelTextError {
     Level(#[from] LevelError),
 }
 
+#[derive(Deserialize)]
+struct Header {
+    #[serde(default)]
+    format: String,
+    #[serde(default)]
+    version: u32,
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LevelText {
@@ -140,16 +148,20 @@ pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
             found: text.len(),
         });
     }
-    let text: LevelText = toml::from_str(text)
-        .map_err(|error| LevelTextError::Malformed(error.to_string().trim().to_owned()))?;
-    if text.format != FORMAT {
-        return Err(LevelTextError::NotALevel { found: text.format });
-    }
-    if text.version != LEVEL_VERSION {
-        return Err(LevelTextError::UnsupportedVersion {
-            found: text.version,
+    let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
+    // Format and version first, whatever keys another version has.
+    let header: Header = toml::from_str(text).map_err(malformed)?;
+    if header.format != FORMAT {
+        return Err(LevelTextError::NotALevel {
+            found: header.format,
         });
     }
+    if header.version != LEVEL_VERSION {
+        return Err(LevelTextError::UnsupportedVersion {
+            found: header.version,
+        });
+    }
+    let text: LevelText = toml::from_str(text).map_err(malformed)?;
     let blocks = text
         .blocks
         .iter()
@@ -177,6 +189,15 @@ pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
     };
     level.check()?;
     Ok(level)
+}
+
+/// The parser's message with its place, without the excerpt that it draws over several lines.
+fn one_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().trim().replace('\n', "; ");
+    match error.span().and_then(|span| text.get(..span.start)) {
+        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
+        None => message,
+    }
 }
 
 fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {

@@ -3,11 +3,11 @@
 use crate::scene::Scene;
 use glam::{DVec3, Vec3};
 
-/// Intensities, irradiances, radii and coordinates above this are refused: squares of larger ones
-/// leave the range of `f32`.
+/// Intensities, irradiances, radii and coordinates above this are refused: together with the smallest
+/// distance that counts, 1e-6 m, and sums over lights and texels, results stay in the range of `f32`.
 pub const MAX_LIGHT_VALUE: f32 = 1e9;
 
-/// A light may stand outside every block by this many block widths, and counts as in the nearest.
+/// A light may stand outside every block by this many block widths, and counts as in the first such block.
 pub const WALL_TOLERANCE: f64 = 1e-4;
 
 /// A source of direct light.
@@ -37,7 +37,7 @@ pub enum Light {
         direction: Vec3,
         /// Full intensity within this angle from the axis, radians.
         inner_angle: f32,
-        /// No light beyond this angle, radians, in (inner, π].
+        /// No light beyond this angle, radians, from the inner angle to π.
         outer_angle: f32,
     },
     /// Parallel light that enters through openings that lead outside.

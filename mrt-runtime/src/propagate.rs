@@ -6,7 +6,7 @@
 //! first. Sequences that reach an opening with the same set of headings behind them are summed before they
 //! go on, since open rooms have binomially many.
 
-use crate::assemble::entering_frame;
+use crate::assemble::{AssembleConfig, AssembleError, entering_frame};
 use crate::dictionary::Dictionary;
 use crate::scene::{Beyond, Scene, SceneBlock};
 use mrt_core::block_sparse::BlockSparse;
@@ -31,8 +31,9 @@ pub(crate) fn response_from_coefficients(
     scene: &Scene,
     dictionary: &Dictionary,
     used_shapes: &[usize],
-    max_depth: usize,
-) -> BlockSparse<f32> {
+    config: &AssembleConfig,
+    max_bytes: usize,
+) -> Result<BlockSparse<f32>, AssembleError> {
     let mut interface_index = BTreeMap::new();
     let mut row_sizes = Vec::new();
     for (block, placed) in scene.blocks.iter().enumerate() {
@@ -45,6 +46,7 @@ pub(crate) fn response_from_coefficients(
     let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
     let response = &dictionary.interface.response_from_lightfield;
     let mut blocks = Vec::new();
+    let mut bytes = 0;
     for (source, placed) in scene.blocks.iter().enumerate() {
         let emission = &dictionary.shapes[used_shapes[placed.shape_index]];
         let arrived = follow(
@@ -52,14 +54,22 @@ pub(crate) fn response_from_coefficients(
             dictionary,
             placed,
             &emission.lightfield_from_coefficients,
-            max_depth,
+            config.max_depth,
         );
         for (entered, lightfield) in arrived {
             let row = interface_index[&entered];
-            blocks.push((row, source, multiply(response.view(), lightfield.view())));
+            let block = multiply(response.view(), lightfield.view());
+            bytes += std::mem::size_of_val(block.data());
+            if bytes > max_bytes {
+                return Err(AssembleError::TooLarge {
+                    expected: config.max_bytes,
+                    found: config.max_bytes - max_bytes + bytes,
+                });
+            }
+            blocks.push((row, source, block));
         }
     }
-    BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks)
+    Ok(BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks))
 }
 
 /// The sum of all light of `source` that enters each (block, face).
@@ -80,6 +90,9 @@ fn follow(
     }
     let mut arrived: BTreeMap<(usize, Face), Matrix<f32>> = BTreeMap::new();
     for depth in 1..=max_depth {
+        if front.is_empty() {
+            break;
+        }
         let mut next = BTreeMap::new();
         for ((block, face, headings, _), wave) in front {
             let here = &scene.blocks[block];

@@ -58,6 +58,8 @@ pub struct SceneBlock {
     pub interfaces: Vec<Interface>,
     /// All openings as loops in the world, in the order of the shape's list.
     pub portals: Vec<Portal>,
+    /// Axis-aligned bounds (smallest, largest), metres.
+    pub bounds: (DVec3, DVec3),
 }
 
 /// An opening's outline in the world.
@@ -132,13 +134,18 @@ impl Scene {
         self.texel_positions.len()
     }
 
-    /// The block that contains a point, or that it lies within `tolerance` (in block widths) of;
-    /// inside beats near.
+    /// The first block that contains a point, else the first that it lies within `tolerance` (in block
+    /// widths) of.
     pub fn block_at(&self, point: DVec3, tolerance: f64) -> Option<usize> {
         let containing = |slack: f64| {
-            self.blocks
-                .iter()
-                .position(|block| block.warp.contains(point, slack))
+            self.blocks.iter().position(|block| {
+                // Most blocks are far away, and this is asked in every frame.
+                let (min, max) = block.bounds;
+                let margin = DVec3::splat(slack) * (max - min).length();
+                point.cmpge(min - margin).all()
+                    && point.cmple(max + margin).all()
+                    && block.warp.contains(point, slack)
+            })
         };
         containing(0.0).or_else(|| containing(tolerance))
     }

@@ -28,7 +28,7 @@ pub enum Toward {
 
 /// Decides what part of a light reaches a point.
 pub trait Visibility {
-    /// Fraction in [0, 1] of the light that arrives.
+    /// Fraction in [0, 1] of the light that arrives; what is more counts as 1, NaN as 0.
     fn fraction(&self, scene: &Scene, receiver: Receiver, toward: Toward) -> f32;
 }
 
@@ -63,14 +63,16 @@ impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
             Toward::Point { position, .. } => position,
             Toward::Infinity(direction) => receiver.position + direction * RAY_REACH,
         };
-        (self.0)(receiver.position, target).clamp(0.0, 1.0)
+        (self.0)(receiver.position, target)
     }
 }
 
 /// Follows the segment from the receiver through connected openings until it is in the light's
 /// block, or outside for lights at infinity.
 ///
-/// Blocks are convex, so inside one nothing is in the way.
+/// Inside a block nothing is in the way: blocks count as convex, as they are unless faces are bent. A line
+/// that leaves through an opening to the outside reaches lights at infinity, even if other blocks of the
+/// level stand further on.
 fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
     let (direction, goal) = match toward {
         Toward::Point { position, block } => (position - receiver.position, Some(block)),
@@ -78,7 +80,7 @@ fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
     };
     let mut here = receiver.block;
     let mut entered = None;
-    // A straight line enters each block at most once.
+    // A straight line enters each convex block at most once.
     for _ in 0..scene.blocks.len() {
         if Some(here) == goal {
             return true;

@@ -389,3 +389,44 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
     }
     assert!(scene.blocks[1].shape.is_open(Face::PosX));
 }
+
+#[test]
+fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
+    let level = Level::from_cells(&[[0, 0, 0]], Vec3::splat(0.5)).expect("one cell");
+    let scene = assembled(&level);
+    let mut frame = Frame::new(&scene);
+    let on_texel = Light::Spot {
+        position: scene.texel_positions[0],
+        radius: 0.1,
+        intensity: Vec3::ONE,
+        direction: Vec3::ONE,
+        inner_angle: 0.5,
+        outer_angle: 1.5,
+    };
+    frame
+        .solve(&scene, &[on_texel], &Openings, Bounces::Count(1))
+        .expect("a light on a wall is inside");
+    assert!(frame.direct().iter().all(|e| e.is_finite()));
+    assert!(frame.indirect().iter().sum::<f32>() > 0.0);
+
+    let lamp = Light::Sphere {
+        position: Vec3::splat(0.5),
+        radius: 0.1,
+        intensity: Vec3::ONE,
+    };
+    let careless = Rays(|from: DVec3, _| if from.x > 0.5 { f32::NAN } else { 7.0 });
+    frame
+        .solve(&scene, &[lamp], &careless, Bounces::Count(1))
+        .expect("a sound light");
+    assert!(frame.direct().iter().all(|e| e.is_finite()));
+    assert!(frame.indirect().iter().sum::<f32>() > 0.0);
+
+    let wrong = vec![f32::NAN; frame.direct().len()];
+    assert!(matches!(
+        frame.solve_from_direct(&scene, &wrong, Bounces::Count(1)),
+        Err(FrameError::Direct {
+            faulty: Some(0),
+            ..
+        })
+    ));
+}

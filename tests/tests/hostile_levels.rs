@@ -280,7 +280,11 @@ proptest! {
             let text = to_text(&level).expect("a sound level has text");
             prop_assert_eq!(from_text(&text).expect("and is read again"), level.clone());
             if level.blocks.len() <= 8 {
-                match assemble(&level, default_dictionary(), &AssembleConfig { max_depth: 2 }) {
+                let config = AssembleConfig {
+                    max_depth: 2,
+                    ..AssembleConfig::default()
+                };
+                match assemble(&level, default_dictionary(), &config) {
                     Ok(_) | Err(AssembleError::RolledInterface { .. }) => {}
                     Err(other) => prop_assert!(false, "{}", other),
                 }
@@ -293,7 +297,11 @@ proptest! {
 fn text_that_is_no_level_says_why() {
     let sound = sound_text();
     let error = |text: &str| from_text(text).expect_err("not a level");
-    assert!(matches!(error(""), LevelTextError::Malformed(_)));
+    assert!(matches!(error(""), LevelTextError::NotALevel { .. }));
+    assert!(matches!(
+        error(&sound.replacen("version = 1", "version = 2\nfog = true", 1)),
+        LevelTextError::UnsupportedVersion { found: 2 }
+    ));
     assert!(matches!(
         error(&sound[..sound.len() / 2]),
         LevelTextError::Malformed(_)
@@ -327,4 +335,30 @@ fn text_that_is_no_level_says_why() {
     let unknown = replaced("cell =", "colour = 3\ncell =");
     assert!(matches!(unknown, LevelTextError::Malformed(_)), "{unknown}");
     assert!(unknown.to_string().contains("colour"), "{unknown}");
+}
+
+#[test]
+fn far_levels_and_endless_depths_are_refused() {
+    let mut level = Level::from_cells(&[[0, 0, 0], [1, 0, 0]], Vec3::ONE).expect("two cells");
+    let config = |max_depth, max_bytes| AssembleConfig {
+        max_depth,
+        max_bytes,
+    };
+    let refused = |level: &Level, config| {
+        assemble(level, default_dictionary(), &config).expect_err("refused")
+    };
+    assert!(matches!(
+        refused(&level, config(usize::MAX, 1 << 30)),
+        AssembleError::Depth { .. }
+    ));
+    assert!(matches!(
+        refused(&level, config(8, 1 << 10)),
+        AssembleError::TooLarge { .. }
+    ));
+    for block in &mut level.blocks {
+        for corner in &mut block.warp.corners {
+            corner.z += 1e6;
+        }
+    }
+    assert!(matches!(level.check(), Err(LevelError::TooFar { .. })));
 }

@@ -33,7 +33,9 @@ fn furnace(level: &Level) -> Frame {
     let scene = assembled(level);
     let mut frame = Frame::new(&scene);
     let direct = vec![1.0; 3 * scene.texel_count()];
-    frame.solve_from_direct(&scene, &direct, Bounces::Count(1));
+    frame
+        .solve_from_direct(&scene, &direct, Bounces::Count(1))
+        .expect("light of the right length");
     frame
 }
 
@@ -77,7 +79,9 @@ fn a_furnace_keeps_its_level_over_all_bounces() {
         let mut frame = Frame::new(&scene);
         // E = a (1 + E) has the solution 1 at a = 1/2.
         let direct = vec![1.0; 3 * scene.texel_count()];
-        frame.solve_from_direct(&scene, &direct, CONVERGED);
+        frame
+            .solve_from_direct(&scene, &direct, CONVERGED)
+            .expect("light of the right length");
         let (worst, mean) = deviation_from_one(frame.indirect());
         println!(
             "all bounces, {name}: worst {:.2} %, mean {:+.3} %",

@@ -151,7 +151,7 @@ pub fn run(args: &AccuracyArgs) -> Result<(), AccuracyError> {
             Ok(lights) => {
                 if args.json {
                     for light in &lights {
-                        println!("{}", serde_json::to_string(light)?);
+                        crate::report_line!("{}", serde_json::to_string(light)?);
                     }
                 }
                 all.extend(lights);
@@ -204,6 +204,7 @@ pub fn compare(
     let level = level(reference, albedo)?;
     let config = AssembleConfig {
         max_depth: args.max_depth,
+        ..AssembleConfig::default()
     };
     let scene =
         assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
@@ -325,7 +326,9 @@ fn our_signal(
 }
 
 fn print(all: &[LightAccuracy]) {
-    println!("relative L2 error of indirect irradiance, %, by openings from the light's block");
+    crate::report_line!(
+        "relative L2 error of indirect irradiance, %, by openings from the light's block"
+    );
     let mut table = Table::new(&["scene", "light", "whole", "0", "1", "2", "3+"]);
     let percent = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", 100.0 * x));
     for light in all {
@@ -353,6 +356,6 @@ fn print(all: &[LightAccuracy]) {
         ))
     }));
     table.row(cells);
-    print!("{table}");
-    println!("preset {}, {}", all[0].preset, all[0].term);
+    crate::report!("{table}");
+    crate::report_line!("preset {}, {}", all[0].preset, all[0].term);
 }

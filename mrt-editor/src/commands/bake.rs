@@ -66,6 +66,12 @@ pub enum BakeError {
     /// The dictionary has no form as bytes.
     #[error(transparent)]
     Dictionary(#[from] DictionaryError),
+    /// A folder stands where the file should be.
+    #[error("cannot write {file}: found a folder; expected the name of a file")]
+    IsFolder {
+        /// The file to write.
+        file: String,
+    },
     /// There is nowhere to write.
     #[error("cannot write {file}: found no folder {found}; expected one that exists")]
     NoFolder {
@@ -123,7 +129,7 @@ pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
         start.elapsed().as_secs_f64(),
     );
     if args.json {
-        println!("{}", serde_json::to_string(&report)?);
+        crate::report_line!("{}", serde_json::to_string(&report)?);
     } else {
         print(&report);
     }
@@ -136,7 +142,11 @@ fn check_folder(file: &Path) -> Result<(), BakeError> {
         Some(parent) if parent != Path::new("") => parent,
         _ => Path::new("."),
     };
-    if folder.is_dir() {
+    if file.is_dir() {
+        Err(BakeError::IsFolder {
+            file: file.display().to_string(),
+        })
+    } else if folder.is_dir() {
         Ok(())
     } else {
         Err(BakeError::NoFolder {
@@ -208,7 +218,7 @@ fn report(args: &BakeArgs, dictionary: &Dictionary, file_bytes: usize, seconds: 
 }
 
 fn print(report: &BakeReport) {
-    println!("{}: {}", report.preset, report.settings);
+    crate::report_line!("{}: {}", report.preset, report.settings);
     let mut table = Table::new(&["shape", "texels", "modes", "energy dropped", "bytes"]);
     for shape in &report.shapes {
         table.row([
@@ -219,16 +229,18 @@ fn print(report: &BakeReport) {
             shape.bytes.to_string(),
         ]);
     }
-    print!("{table}");
-    println!(
+    crate::report!("{table}");
+    crate::report_line!(
         "openings: {} lightfield modes (energy dropped {:.2e}), {} response modes ({:.2e})",
         report.lightfield_modes,
         report.lightfield_dropped_energy,
         report.response_modes,
         report.response_dropped_energy
     );
-    println!(
+    crate::report_line!(
         "{}: {} bytes in {:.1} s",
-        report.file, report.file_bytes, report.seconds
+        report.file,
+        report.file_bytes,
+        report.seconds
     );
 }

@@ -8,7 +8,8 @@ use crate::picture::tone::{auto_exposure, tone_map};
 use crate::picture::{Picture, render};
 use crate::reference_level::{LevelErrors, ReferenceLevelError, measure};
 use crate::table::Table;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use mrt_core::hexahedron::Hexahedron;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::{Bounces, Frame, FrameError, StageTimes};
@@ -99,6 +100,12 @@ pub enum DemoError {
     /// The exact solution failed.
     #[error(transparent)]
     Exact(#[from] ReferenceLevelError),
+    /// A file stands where the folder should be.
+    #[error("--out {file}: found a file; expected a folder or a new name")]
+    OutIsFile {
+        /// The file.
+        file: String,
+    },
     /// A picture cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
@@ -128,6 +135,12 @@ struct DemoReport {
 /// # Errors
 /// [`DemoError`].
 pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
+    // Found out now rather than after the work.
+    if args.out.exists() && !args.out.is_dir() {
+        return Err(DemoError::OutIsFile {
+            file: args.out.display().to_string(),
+        });
+    }
     let dictionary = load(args.dictionary.as_deref(), None)?;
     let level = read_level(args)?;
     let start = Instant::now();
@@ -154,7 +167,7 @@ pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
         pictures,
     );
     if args.json {
-        println!("{}", serde_json::to_string(&report)?);
+        crate::report_line!("{}", serde_json::to_string(&report)?);
     } else {
         print(&report);
     }
@@ -175,36 +188,36 @@ fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
     from_text(&text).map_err(|source| DemoError::Level { place, source })
 }
 
-/// A warm light in the first block and a cool one in a block far from it.
+/// A warm light in the first block and a cool one in the block farthest from it.
 fn maze_lights(scene: &Scene) -> Vec<Light> {
-    let center = |block: usize| scene.blocks[block].warp.center().as_vec3();
-    let size = scene.blocks[0].warp.diagonal() as f32 / 3f32.sqrt();
-    let first = center(0);
-    let far = (0..scene.blocks.len()).map(center).fold(first, |far, c| {
-        if c.distance(first) > far.distance(first) {
-            c
-        } else {
-            far
+    let center = |block: usize| scene.blocks[block].warp.center();
+    let far = (0..scene.blocks.len())
+        .max_by(|&a, &b| {
+            let distance = |block: usize| center(block).distance(center(0));
+            distance(a).total_cmp(&distance(b))
+        })
+        .unwrap_or(0);
+    let sphere = |block: usize, unit: DVec3, intensity: Vec3| {
+        let warp = &scene.blocks[block].warp;
+        let size = block_size(warp);
+        Light::Sphere {
+            position: warp.point(unit).as_vec3(),
+            radius: 0.1 * size,
+            intensity: intensity * size * size,
         }
-    });
-    let sphere = |position: Vec3, intensity: Vec3| Light::Sphere {
-        position,
-        radius: 0.1 * size,
-        intensity: intensity * size * size,
     };
-    let warm = sphere(
-        first + Vec3::new(0.1, 0.2, 0.0) * size,
-        Vec3::new(1.0, 0.82, 0.6),
-    );
-    let cool = sphere(
-        far + Vec3::new(0.0, 0.25, 0.0) * size,
-        Vec3::new(0.55, 0.75, 1.0),
-    );
-    if far == first {
+    let warm = sphere(0, DVec3::new(0.6, 0.7, 0.5), Vec3::new(1.0, 0.82, 0.6));
+    let cool = sphere(far, DVec3::new(0.5, 0.75, 0.5), Vec3::new(0.55, 0.75, 1.0));
+    if far == 0 {
         vec![warm]
     } else {
         vec![warm, cool]
     }
+}
+
+/// Edge of the cube with the block's diagonal, metres.
+fn block_size(warp: &Hexahedron) -> f32 {
+    (warp.diagonal() / 3f64.sqrt()) as f32
 }
 
 /// The fastest of several frames of one bounce.
@@ -240,22 +253,21 @@ fn take_pictures(
         .blocks
         .iter()
         .map(|b| b.warp.bounds())
-        .fold((glam::DVec3::MAX, glam::DVec3::MIN), |(lo, hi), (a, b)| {
+        .fold((DVec3::MAX, DVec3::MIN), |(lo, hi), (a, b)| {
             (lo.min(a), hi.max(b))
         });
     let (min, max) = (min.as_vec3(), max.as_vec3());
     let (middle, extent) = (0.5 * (min + max), (max - min).max_element());
-    let first = &scene.blocks[0].warp;
-    let size = first.diagonal() as f32 / 3f32.sqrt();
+    let size = block_size(&scene.blocks[0].warp);
     let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
     let from_above = middle + Vec3::new(0.0, 1.0 * extent, 0.6 * extent);
     let eye = scene.blocks[0]
         .warp
-        .point(glam::DVec3::new(0.06, 0.5, 0.5))
+        .point(DVec3::new(0.06, 0.5, 0.5))
         .as_vec3();
     let ahead = scene.blocks[0]
         .warp
-        .point(glam::DVec3::new(3.0, 0.42, 0.5))
+        .point(DVec3::new(3.0, 0.42, 0.5))
         .as_vec3();
     let views = [
         view(
@@ -351,12 +363,15 @@ fn print(report: &DemoReport) {
         .iter()
         .map(|(shape, modes)| format!("{shape} {modes}"))
         .collect();
-    println!(
+    crate::report_line!(
         "maze: {} blocks, {} openings between them, {} texels; preset {}",
-        report.blocks, report.connections, report.texels, report.preset
+        report.blocks,
+        report.connections,
+        report.texels,
+        report.preset
     );
-    println!("modes by shape: {}", modes.join(", "));
-    println!(
+    crate::report_line!("modes by shape: {}", modes.join(", "));
+    crate::report_line!(
         "operators: {} KiB used by this level, {} KiB in the dictionary\n",
         report.operator_bytes / 1024,
         report.dictionary_bytes / 1024
@@ -370,7 +385,7 @@ fn print(report: &DemoReport) {
         "assembling the level (once)".to_owned(),
         format!("{:.3}", report.assemble_ms),
     ]);
-    println!("{table}");
+    crate::report_line!("{table}");
     if let Some(errors) = &report.errors {
         let percent = |x: f64| format!("{:.2} %", 100.0 * x);
         let mut table = Table::new(&["error against the exact solution", "relative L2"]);
@@ -386,11 +401,11 @@ fn print(report: &DemoReport) {
             format!("direct and indirect, {BOUNCES} bounces"),
             percent(errors.total),
         ]);
-        println!("{table}");
-        println!("the exact solution took {:.1} s\n", errors.exact_seconds);
+        crate::report_line!("{table}");
+        crate::report_line!("the exact solution took {:.1} s\n", errors.exact_seconds);
     }
-    println!("pictures:");
+    crate::report_line!("pictures:");
     for picture in &report.pictures {
-        println!("  {picture}");
+        crate::report_line!("  {picture}");
     }
 }

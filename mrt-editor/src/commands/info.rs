@@ -87,7 +87,7 @@ pub fn run(args: &InfoArgs) -> Result<(), InfoError> {
     };
     let info = info(args, &dictionary, spectra);
     if args.json {
-        println!("{}", serde_json::to_string(&info)?);
+        crate::report_line!("{}", serde_json::to_string(&info)?);
     } else {
         print(&info);
     }
@@ -145,8 +145,8 @@ fn info<'a>(
 }
 
 fn print(info: &Info) {
-    println!("{}", info.file);
-    println!("preset {}: {}", info.preset, info.settings);
+    crate::report_line!("{}", info.file);
+    crate::report_line!("preset {}: {}", info.preset, info.settings);
     let mut table = Table::new(&[
         "shape",
         "openings",
@@ -170,17 +170,17 @@ fn print(info: &Info) {
             shape.bytes.to_string(),
         ]);
     }
-    print!("{table}");
-    println!(
+    crate::report!("{table}");
+    crate::report_line!(
         "openings: {} lightfield modes (energy dropped {:.2e}), {} response modes ({:.2e})",
         info.lightfield_modes,
         info.lightfield_dropped_energy,
         info.response_modes,
         info.response_dropped_energy
     );
-    println!("{} bytes of matrices", info.bytes);
+    crate::report_line!("{} bytes of matrices", info.bytes);
     if let Some(spectra) = &info.spectra {
-        println!("\nsingular values that hold a share of the energy, closed cube:");
+        crate::report_line!("\nsingular values that hold a share of the energy, closed cube:");
         let mut table = Table::new(&["matrix", "size", "80 %", "90 %", "95 %"]);
         for spectrum in spectra {
             table.row([
@@ -191,6 +191,6 @@ fn print(info: &Info) {
                 spectrum.values_for_95_percent.to_string(),
             ]);
         }
-        print!("{table}");
+        crate::report!("{table}");
     }
 }

@@ -10,6 +10,9 @@ pub use error::LightCommandError;
 
 use crate::dictionary_source::load;
 use crate::import::read_scene;
+use crate::map::paint::coverage;
+use crate::map::surface::spread_points;
+use crate::output::is_same_place;
 use crate::picture::camera::Camera;
 use crate::picture::lit::{LitScene, SphereLight};
 use crate::picture::placement::{
@@ -59,6 +62,13 @@ const CONVERGED: Bounces = Bounces::Converged {
 /// shadow ray takes the surface for something in the way.
 const WALL_SLACK: f64 = 0.15;
 
+/// Points on the mesh at which its level is looked for.
+const COVERAGE_POINTS: usize = 4096;
+
+/// With less of its area in or near a block, a mesh was not meant by the level. Levels of `mrt map` hold 70 %
+/// and more.
+const LEAST_COVERAGE: f64 = 0.1;
+
 /// Pictures of one camera.
 struct View {
     name: String,
@@ -73,12 +83,32 @@ struct View {
 /// [`LightCommandError`]; then the output folder is as it was before.
 pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     let start = Instant::now();
+    for input in [&args.scene, &args.level] {
+        let folder = match input.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        if is_same_place(folder, &args.out) {
+            return Err(LightCommandError::OutHoldsInput {
+                out: args.out.clone(),
+                input: input.clone(),
+            });
+        }
+    }
     let imported = read_scene(&args.scene, &args.import.config())?;
     let mesh = &imported.mesh;
     let level = read_level(&args.level)?;
     let bvh = Bvh::build(mesh);
     let surroundings = Surroundings::new(mesh, &bvh, &level);
     let receivers = ReceiverMap::with_mesh(&level, &bvh);
+    let covered = coverage(&level, &receivers, &spread_points(mesh, COVERAGE_POINTS)).near;
+    if covered < LEAST_COVERAGE {
+        return Err(LightCommandError::OtherMesh {
+            path: args.level.clone(),
+            expected: LEAST_COVERAGE,
+            found: covered,
+        });
+    }
     let lights = place_lights(args, &level, &receivers, &surroundings)?;
 
     let dictionary_start = Instant::now();
@@ -126,7 +156,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     };
     if args.json {
         // A struct of numbers and names always has a text.
-        println!("{}", serde_json::to_string(&report).unwrap_or_default());
+        crate::report_line!("{}", serde_json::to_string(&report).unwrap_or_default());
     } else {
         report.print();
     }

@@ -4,6 +4,7 @@ use crate::import::{ImportConfig, ImportError, ImportReport, UpAxis, read_scene}
 use crate::map::paint::Coverage;
 use crate::map::voxels::Winding;
 use crate::map::{Fit, MapConfig, MapError, Mapped, map_mesh};
+use crate::output::is_same_place;
 use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_runtime::level_text::{LevelTextError, to_text};
 use serde::Serialize;
@@ -89,6 +90,12 @@ pub enum MapCommandError {
     /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] ContainerError),
+    /// The level would replace the mesh.
+    #[error("--out {}: found the mesh itself; expected another file", path.display())]
+    OutIsScene {
+        /// The file.
+        path: PathBuf,
+    },
 }
 
 #[derive(Serialize)]
@@ -111,6 +118,11 @@ struct Report {
 /// # Errors
 /// [`MapCommandError`]; then no file is written or changed.
 pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
+    if is_same_place(&args.scene, &args.out) {
+        return Err(MapCommandError::OutIsScene {
+            path: args.out.clone(),
+        });
+    }
     let start = Instant::now();
     let scene = read_scene(&args.scene, &args.import.config())?;
     let config = MapConfig {
@@ -127,7 +139,7 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
     let report = Report::new(scene.report, &mapped, start);
     if args.json {
         // A struct of numbers and names always has a text.
-        println!("{}", serde_json::to_string(&report).unwrap_or_default());
+        crate::report_line!("{}", serde_json::to_string(&report).unwrap_or_default());
     } else {
         report.print();
     }
@@ -158,7 +170,7 @@ impl Report {
     fn print(&self) {
         let mesh = &self.mesh;
         mesh.print();
-        let row = |name: &str, value: String| println!("{name:<22} {value}");
+        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
         row("blocks", self.blocks.to_string());
         row("connections", self.connections.to_string());
         for (shape, count) in &self.shapes {
@@ -189,7 +201,7 @@ impl Report {
 impl ImportReport {
     /// Prints the report's rows.
     pub fn print(&self) {
-        let row = |name: &str, value: String| println!("{name:<22} {value}");
+        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
         let [x, y, z] = self.size_m;
         row("triangles", self.triangles.to_string());
         row(

@@ -21,23 +21,41 @@ pub struct Coverage {
     pub near: f64,
 }
 
-/// Paints the walls and measures how much of the mesh the level holds.
-pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoint]) -> Coverage {
-    let receivers = ReceiverMap::new(level);
-    let diagonals: Vec<f64> = level.blocks.iter().map(|b| b.warp.diagonal()).collect();
-    let mut walls = vec![[(DVec3::ZERO, 0.0); 6]; level.blocks.len()];
+/// Measures how much of the mesh the level holds.
+pub fn coverage(level: &Level, receivers: &ReceiverMap, points: &[SurfacePoint]) -> Coverage {
     let (mut inside, mut near, mut total) = (0.0, 0.0, 0.0);
     for point in points {
         total += point.area;
-        let Some((block, distance)) = receivers.nearest_block(point.position) else {
-            continue;
-        };
+        let distance = distance_in_blocks(level, receivers, point);
         // Rounding puts a wall's own surface a hair outside.
-        let is_inside = distance <= 1e-3 * diagonals[block];
-        let is_near = distance <= NEAR * diagonals[block];
-        inside += if is_inside { point.area } else { 0.0 };
-        near += if is_near { point.area } else { 0.0 };
-        if !is_near {
+        inside += if distance <= 1e-3 { point.area } else { 0.0 };
+        near += if distance <= NEAR { point.area } else { 0.0 };
+    }
+    if total == 0.0 {
+        return Coverage::default();
+    }
+    Coverage {
+        inside: inside / total,
+        near: near / total,
+    }
+}
+
+/// Distance from the nearest block in diagonals of it.
+fn distance_in_blocks(level: &Level, receivers: &ReceiverMap, point: &SurfacePoint) -> f64 {
+    receivers
+        .nearest_block(point.position)
+        .map_or(f64::INFINITY, |(block, distance)| {
+            distance / level.blocks[block].warp.diagonal()
+        })
+}
+
+/// Paints the walls and measures how much of the mesh the level holds.
+pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoint]) -> Coverage {
+    let receivers = ReceiverMap::new(level);
+    let covered = coverage(level, &receivers, points);
+    let mut walls = vec![[(DVec3::ZERO, 0.0); 6]; level.blocks.len()];
+    for point in points {
+        if distance_in_blocks(level, &receivers, point) > NEAR {
             continue;
         }
         if let Some(receiver) = receivers.receiver(point.position, point.normal) {
@@ -59,10 +77,7 @@ pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoin
             };
         }
     }
-    Coverage {
-        inside: inside / total,
-        near: near / total,
-    }
+    covered
 }
 
 /// The mean over areas, `None` without any; kept in [0, 1] against rounding.

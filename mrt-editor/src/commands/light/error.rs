@@ -12,6 +12,28 @@ use std::path::PathBuf;
 /// Why there are no pictures.
 #[derive(Debug, thiserror::Error)]
 pub enum LightCommandError {
+    /// The output would replace the mesh or the level.
+    #[error("--out {}: found the folder of {}; expected a folder of its own", out.display(), input.display())]
+    OutHoldsInput {
+        /// The output folder.
+        out: PathBuf,
+        /// The input in it.
+        input: PathBuf,
+    },
+    /// Mesh and level do not lie in the same place.
+    #[error(
+        "level {}: {:.1} % of the mesh's area lies in or near a block; expected at least {:.0} % (is it this \
+         mesh's level, and are --scale and --up those of `mrt map`?)",
+        path.display(), 100.0 * found, 100.0 * expected
+    )]
+    OtherMesh {
+        /// The level file.
+        path: PathBuf,
+        /// Smallest share accepted.
+        expected: f64,
+        /// Share of the area.
+        found: f64,
+    },
     /// The mesh cannot be read.
     #[error(transparent)]
     Import(#[from] ImportError),

@@ -58,7 +58,7 @@ impl View {
 impl Report {
     pub(super) fn print(&self) {
         self.mesh.print();
-        let row = |name: &str, value: String| println!("{name:<22} {value}");
+        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
         row("blocks", self.blocks.to_string());
         row("connections", self.connections.to_string());
         for [x, y, z, radius, _, r, g, b] in &self.lights {
