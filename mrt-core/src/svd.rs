@@ -112,7 +112,12 @@ pub fn energy_rank(singular_values: &[f64], fraction: f64) -> usize {
 pub fn dropped_energy(singular_values: &[f64], kept: usize) -> f64 {
     let total: f64 = singular_values.iter().map(|s| s * s).sum();
     let dropped: f64 = singular_values.iter().skip(kept).map(|s| s * s).sum();
-    if total > 0.0 { dropped / total } else { 0.0 }
+    // The empty sum of floats is -0.
+    if total > 0.0 {
+        dropped / total + 0.0
+    } else {
+        0.0
+    }
 }
 
 /// [`dropped_energy`] of what lies beyond the first value, for spectra whose first mode is there by

@@ -15,7 +15,8 @@ use mrt_core::matrix::Matrix;
 use mrt_runtime::dictionary::{self, Dictionary, ShapeOperators};
 use mrt_runtime::shape::{SHAPES, Shape};
 
-/// Bakes all [`SHAPES`]. The same settings give the same bits on every machine and thread count.
+/// Bakes all [`SHAPES`] with settings that pass [`BakeConfig::check`]. The same settings give the same bits
+/// on every machine and thread count.
 ///
 /// # Errors
 /// [`Cancelled`].

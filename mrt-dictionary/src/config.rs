@@ -1,6 +1,6 @@
 //! Settings of a bake and the named presets.
 
-use mrt_runtime::dictionary_file::{MAX_MODES, MAX_RESOLUTION};
+use mrt_runtime::dictionary_file::MAX_MODES;
 
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,6 +88,12 @@ pub enum ConfigError {
     },
 }
 
+/// Largest resolution that is baked: F of the closed cube takes 8 bytes x 36 x resolution⁴, 302 MB there.
+pub const MAX_BAKE_RESOLUTION: usize = 32;
+
+/// Largest number of lightfield samples times modes: 2 GiB a matrix, of which a bake holds several.
+const MAX_LIGHTFIELD_NUMBERS: f64 = (1u64 << 28) as f64;
+
 /// Names of the presets.
 pub const PRESETS: [&str; 3] = ["mobile", "standard", "quality"];
 
@@ -128,7 +134,7 @@ impl BakeConfig {
     pub fn check(&self) -> Result<(), ConfigError> {
         let lightfield = &self.lightfield;
         let max_modes = MAX_MODES as f64;
-        let max_resolution = MAX_RESOLUTION as f64;
+        let max_resolution = MAX_BAKE_RESOLUTION as f64;
         let weights = self.enrichment.as_ref().map_or([0.0; 3], |e| {
             [e.uniform_weight, e.constant_weight, e.indirect_weight]
         });
@@ -170,6 +176,13 @@ impl BakeConfig {
                 lightfield.response_modes as f64,
                 1.0,
                 max_modes,
+            ),
+            (
+                "lightfield samples times modes",
+                (lightfield.positions * lightfield.directions).pow(2) as f64
+                    * lightfield.lightfield_modes as f64,
+                1.0,
+                MAX_LIGHTFIELD_NUMBERS,
             ),
             (
                 "enrichment rounds",

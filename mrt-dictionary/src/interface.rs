@@ -121,12 +121,14 @@ pub fn lightfield_basis(
     modes: usize,
     progress: &Progress,
 ) -> Result<LightfieldBasis, Cancelled> {
-    struct Mode {
-        class: usize,
-        scale: f64,
-        vector: Vec<f64>,
+    /// What a class was decomposed into: its columns, and the weights of them in each mode.
+    struct Part {
+        folded: Vec<Vec<f64>>,
+        weights: Matrix<f64>,
     }
-    let mut found: Vec<Mode> = Vec::new();
+    let mut parts = Vec::with_capacity(classes.class_count());
+    // (singular value, class, position in the class) of every mode that rounding leaves standing.
+    let mut found: Vec<(f64, usize, usize)> = Vec::new();
     for class in 0..classes.class_count() {
         progress.check()?;
         let folded: Vec<Vec<f64>> = columns
@@ -140,42 +142,35 @@ pub fn lightfield_basis(
             .map(|j| (j..count).map(|i| dot(&folded[i], &folded[j])).collect())
             .collect();
         let gram = Matrix::from_fn(count, count, |i, j| lower[i.min(j)][i.max(j) - i.min(j)]);
-        let (values, vectors) = symmetric_eigen(gram.view());
+        let (values, weights) = symmetric_eigen(gram.view());
         let floor = 1e-12 * values.first().copied().unwrap_or(0.0);
-        let kept = values.iter().take_while(|&&v| v > floor && v > 0.0).count();
-        let class_modes: Vec<Mode> = (0..kept.min(modes))
-            .into_par_iter()
-            .map(|k| {
-                let scale = values[k].sqrt();
-                let mut vector = vec![0.0; classes.dimension(class)];
-                for (column, &weight) in folded.iter().zip(vectors.column(k)) {
-                    let weight = weight / scale;
-                    for (v, &x) in vector.iter_mut().zip(column) {
-                        *v += weight * x;
-                    }
-                }
-                let sign = largest_entry_sign(&vector);
-                vector.iter_mut().for_each(|v| *v *= sign);
-                Mode {
-                    class,
-                    scale,
-                    vector,
-                }
-            })
-            .collect();
-        found.extend(class_modes);
+        let standing = values.iter().take_while(|&&v| v > floor && v > 0.0);
+        found.extend(standing.enumerate().map(|(k, v)| (v.sqrt(), class, k)));
+        parts.push(Part { folded, weights });
     }
-    found.sort_by(|a, b| b.scale.total_cmp(&a.scale));
-    let all: Vec<f64> = found.iter().map(|mode| mode.scale).collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let all: Vec<f64> = found.iter().map(|mode| mode.0).collect();
     let kept = whole_multiplets(&all, modes);
     let vectors: Vec<Vec<f64>> = found[..kept]
         .par_iter()
-        .map(|mode| classes.unfold(mode.class, &mode.vector))
+        .map(|&(scale, class, k)| {
+            let part = &parts[class];
+            let mut vector = vec![0.0; classes.dimension(class)];
+            for (column, &weight) in part.folded.iter().zip(part.weights.column(k)) {
+                let weight = weight / scale;
+                for (v, &x) in vector.iter_mut().zip(column) {
+                    *v += weight * x;
+                }
+            }
+            let sign = largest_entry_sign(&vector);
+            vector.iter_mut().for_each(|v| *v *= sign);
+            classes.unfold(class, &vector)
+        })
         .collect();
     Ok(LightfieldBasis {
         vectors: Matrix::from_columns(classes.point_count(), &vectors),
         scales: all[..kept].to_vec(),
-        classes: found[..kept].iter().map(|mode| mode.class).collect(),
+        classes: found[..kept].iter().map(|mode| mode.1).collect(),
         dropped_energy: dropped_energy_beyond_first(&all, kept),
     })
 }
