@@ -124,6 +124,16 @@ pub enum MapError {
         /// The size given.
         found: f64,
     },
+    /// Blocks could not be told apart in the free space that is found.
+    #[error(
+        "--cell {found}; expected at least {expected:.3} m, the edge of the finest voxel for this mesh"
+    )]
+    CellTooSmall {
+        /// Smallest accepted, metres.
+        expected: f64,
+        /// The size given.
+        found: f64,
+    },
     /// A share is not in [0, 1].
     #[error("{flag} {found}; expected a number from 0 to 1")]
     Share {
@@ -191,14 +201,21 @@ fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapErr
         let grid = VoxelGrid::around(low, high, edge);
         find_free_space(&triangles, grid, config.winding).ok_or(MapError::TooDense)
     };
+    let finest = voxel_edge(MOST_VOXELS);
     let cell = match config.cell {
+        Some(found) if found < finest => {
+            return Err(MapError::CellTooSmall {
+                expected: finest,
+                found,
+            });
+        }
         Some(cell) => cell,
         None => {
             let first = free_space(voxel_edge(FIRST_VOXELS))?;
             usual_cell(&first, config.max_blocks).ok_or(MapError::NoFreeSpace)?
         }
     };
-    let edge = (cell / VOXELS_A_CELL).max(voxel_edge(MOST_VOXELS));
+    let edge = (cell / VOXELS_A_CELL).max(finest);
     let space: FreeSpace = free_space(edge)?;
     let columns = Columns::new(&space, LEAST_HEADROOM * cell);
     if columns.runs.is_empty() {
