@@ -161,6 +161,13 @@ impl CubeRotation {
         }
     }
 
+    /// The rotation about +y that takes +z to a side direction; `None` for +y and -y.
+    pub fn about_y_to(heading: Face) -> Option<CubeRotation> {
+        (0..4)
+            .map(CubeRotation::about_y)
+            .find(|rotation| rotation.face(Face::PosZ) == heading)
+    }
+
     /// All 24.
     pub fn all() -> impl Iterator<Item = CubeRotation> {
         Face::ALL.into_iter().flat_map(|x| {
@@ -238,6 +245,14 @@ mod tests {
                 let center = rotation.point(face.point(0.5, 0.5));
                 assert_eq!(center, rotation.face(face).point(0.5, 0.5));
             }
+        }
+    }
+
+    #[test]
+    fn z_turns_to_every_side_and_to_no_other() {
+        for heading in Face::ALL {
+            let turned = CubeRotation::about_y_to(heading).map(|r| r.face(Face::PosZ));
+            assert_eq!(turned, (heading.axis() != 1).then_some(heading));
         }
     }
 

@@ -139,10 +139,6 @@ impl<T: Scalar> Matrix<T> {
     pub fn column(&self, j: usize) -> &[T] {
         &self.data[j * self.rows..(j + 1) * self.rows]
     }
-    /// One column, to write.
-    pub fn column_mut(&mut self, j: usize) -> &mut [T] {
-        &mut self.data[j * self.rows..(j + 1) * self.rows]
-    }
     /// All of it, borrowed.
     pub fn view(&self) -> MatrixView<'_, T> {
         MatrixView {

@@ -141,14 +141,6 @@ impl ParityClasses {
             .collect();
         Matrix::from_columns(self.dimension(class), &columns)
     }
-
-    /// [`ParityClasses::unfold`] for every column.
-    pub fn unfold_columns(&self, class: usize, coordinates: &Matrix<f64>) -> Matrix<f64> {
-        let columns: Vec<_> = (0..coordinates.columns())
-            .map(|j| self.unfold(class, coordinates.column(j)))
-            .collect();
-        Matrix::from_columns(self.point_count, &columns)
-    }
 }
 
 fn image(mirrors: &[Vec<u32>], element: u32, point: u32) -> u32 {

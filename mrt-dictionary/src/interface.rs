@@ -13,7 +13,7 @@ use crate::transport::whole_multiplets;
 use glam::{DVec2, DVec3};
 use mrt_core::cube::Face;
 use mrt_core::form_factor::point_to_polygon;
-use mrt_core::matrix::{Matrix, dot, multiply, transpose_multiply};
+use mrt_core::matrix::{Matrix, dot, transpose_multiply};
 use mrt_core::parity::ParityClasses;
 use mrt_core::svd::{dropped_energy_beyond_first, largest_entry_sign, svd, symmetric_eigen};
 use mrt_runtime::shape::Shape;
@@ -412,11 +412,4 @@ fn add_cell(
     let center = low + 0.5 * width;
     let direction = (point - center.extend(0.0)).normalize();
     accumulate(by_sample, &grid.taps(center, direction), PI * factor, row);
-}
-
-/// Largest singular value of an operator: its greatest gain of flux.
-pub fn norm(operator: &Matrix<f64>) -> f64 {
-    let gram = multiply(operator.transposed().view(), operator.view());
-    let (values, _) = symmetric_eigen(gram.view());
-    values.first().copied().unwrap_or(0.0).max(0.0).sqrt()
 }

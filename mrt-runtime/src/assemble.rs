@@ -328,10 +328,10 @@ fn response_basis_at(
     opening: Face,
     resolution: usize,
 ) -> Matrix<f32> {
+    let canonical = entering_frame(opening).inverse();
     let rows: Vec<usize> = shape
         .texels(resolution)
         .map(|(face, point)| {
-            let canonical = entering_frame(opening).inverse();
             receiver_texel(canonical.face(face), canonical.point(point), resolution)
         })
         .collect();
@@ -339,11 +339,10 @@ fn response_basis_at(
 }
 
 /// Takes the canonical interface, entered towards +z, to an opening entered from outside.
+///
+/// Openings are side faces, as in every shape; any other would count as entered towards +z.
 pub(crate) fn entering_frame(opening: Face) -> CubeRotation {
-    (0..4)
-        .map(CubeRotation::about_y)
-        .find(|rotation| rotation.face(Face::NegZ) == opening)
-        .unwrap_or(CubeRotation::IDENTITY)
+    CubeRotation::about_y_to(opening.opposite()).unwrap_or(CubeRotation::IDENTITY)
 }
 
 /// Row of a texel among the five walls of the cube open at -z.

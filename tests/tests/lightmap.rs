@@ -4,7 +4,7 @@ mod common;
 
 use common::{assembled, floor_plan, solved, sphere};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::Face;
+use mrt_core::cube::{CubeRotation, Face};
 use mrt_runtime::frame::{Bounces, Frame};
 use mrt_runtime::level::Level;
 use mrt_runtime::scene::{Beyond, Scene};
@@ -85,6 +85,47 @@ fn sides(face: Face) -> impl Iterator<Item = Face> {
         .filter(move |side| side.axis() != face.axis())
 }
 
+/// An edge of a wall at an opening beyond which the wall goes on.
+struct JoinedEdge {
+    block: usize,
+    face: Face,
+    /// The opening.
+    side: Face,
+    there: usize,
+    /// The wall beyond.
+    other_wall: Face,
+    there_from_here: CubeRotation,
+}
+
+fn joined_edges(scene: &Scene) -> Vec<JoinedEdge> {
+    let mut edges = Vec::new();
+    for (block, face) in walls(scene) {
+        for side in sides(face) {
+            let Beyond::Block {
+                block: there,
+                here_from_there,
+                ..
+            } = scene.blocks[block].beyond[side.index()]
+            else {
+                continue;
+            };
+            let there_from_here = here_from_there.inverse();
+            let other_wall = there_from_here.face(face);
+            if !scene.blocks[there].shape.is_open(other_wall) {
+                edges.push(JoinedEdge {
+                    block,
+                    face,
+                    side,
+                    there,
+                    other_wall,
+                    there_from_here,
+                });
+            }
+        }
+    }
+    edges
+}
+
 /// The point at `along` in [0, 1] of the edge between two faces.
 fn edge_point(face: Face, side: Face, along: f64) -> DVec3 {
     let mut unit = DVec3::splat(along);
@@ -141,32 +182,25 @@ fn joined_walls_meet_without_a_step() {
     let (_, scene, frame) = lit();
     let brightest = frame.indirect().iter().fold(0.0f32, |m, &e| m.max(e));
     let (mut edges, mut step) = (0, 0.0f32);
-    for (block, face) in walls(&scene) {
-        for side in sides(face) {
-            let Beyond::Block {
-                block: there,
-                here_from_there,
-                ..
-            } = scene.blocks[block].beyond[side.index()]
-            else {
-                continue;
-            };
-            let there_from_here = here_from_there.inverse();
-            let other_wall = there_from_here.face(face);
-            if scene.blocks[there].shape.is_open(other_wall) {
-                continue;
-            }
-            edges += 1;
-            for k in 0..=64 {
-                let here = edge_point(face, side, f64::from(k) / 64.0);
-                let beyond = there_from_here.point(here - side.outward());
-                let (u, v) = on_face(face, here);
-                let ours = look_up(&scene, &frame, block, face, u, v);
-                let (u, v) = on_face(other_wall, beyond);
-                let theirs = look_up(&scene, &frame, there, other_wall, u, v);
-                for (a, b) in ours.into_iter().zip(theirs) {
-                    step = step.max((a - b).abs());
-                }
+    for edge in joined_edges(&scene) {
+        let JoinedEdge {
+            block,
+            face,
+            side,
+            there,
+            other_wall,
+            there_from_here,
+        } = edge;
+        edges += 1;
+        for k in 0..=64 {
+            let here = edge_point(face, side, f64::from(k) / 64.0);
+            let beyond = there_from_here.point(here - side.outward());
+            let (u, v) = on_face(face, here);
+            let ours = look_up(&scene, &frame, block, face, u, v);
+            let (u, v) = on_face(other_wall, beyond);
+            let theirs = look_up(&scene, &frame, there, other_wall, u, v);
+            for (a, b) in ours.into_iter().zip(theirs) {
+                step = step.max((a - b).abs());
             }
         }
     }
@@ -208,36 +242,29 @@ fn light_is_continuous_on_the_way_across_an_opening() {
     }
     // A bilinear filter changes by at most one texel's difference a texel, twice that across the edge.
     let bound = 2.0 * (DELTA * scene.resolution as f64) as f32 * largest_difference;
-    for (block, face) in walls(&scene) {
-        for side in sides(face) {
-            let Beyond::Block {
-                block: there,
-                here_from_there,
-                ..
-            } = scene.blocks[block].beyond[side.index()]
-            else {
-                continue;
-            };
-            let there_from_here = here_from_there.inverse();
-            let other_wall = there_from_here.face(face);
-            if scene.blocks[there].shape.is_open(other_wall) {
-                continue;
-            }
-            for k in 0..=32 {
-                let edge = edge_point(face, side, f64::from(k) / 32.0);
-                let before = edge - side.outward() * DELTA;
-                let after = there_from_here.point(edge + side.outward() * DELTA - side.outward());
-                let (u, v) = on_face(face, before);
-                let ours = look_up(&scene, &frame, block, face, u, v);
-                let (u, v) = on_face(other_wall, after);
-                let theirs = look_up(&scene, &frame, there, other_wall, u, v);
-                for (a, b) in ours.into_iter().zip(theirs) {
-                    assert!(
-                        (a - b).abs() <= bound,
-                        "{} of at most {bound}",
-                        (a - b).abs()
-                    );
-                }
+    for edge in joined_edges(&scene) {
+        let JoinedEdge {
+            block,
+            face,
+            side,
+            there,
+            other_wall,
+            there_from_here,
+        } = edge;
+        for k in 0..=32 {
+            let edge = edge_point(face, side, f64::from(k) / 32.0);
+            let before = edge - side.outward() * DELTA;
+            let after = there_from_here.point(edge + side.outward() * DELTA - side.outward());
+            let (u, v) = on_face(face, before);
+            let ours = look_up(&scene, &frame, block, face, u, v);
+            let (u, v) = on_face(other_wall, after);
+            let theirs = look_up(&scene, &frame, there, other_wall, u, v);
+            for (a, b) in ours.into_iter().zip(theirs) {
+                assert!(
+                    (a - b).abs() <= bound,
+                    "{} of at most {bound}",
+                    (a - b).abs()
+                );
             }
         }
     }

@@ -6,7 +6,6 @@ use super::*;
 #[derive(Clone, Debug)]
 pub struct Container<'a> {
     version: u32,
-    bytes: &'a [u8],
     sections: Vec<Section<'a>>,
 }
 
@@ -63,7 +62,6 @@ impl<'a> Container<'a> {
         }
         Ok(Self {
             version,
-            bytes,
             sections,
         })
     }
@@ -133,11 +131,6 @@ impl<'a> Container<'a> {
                 Err(malformed("number", at, "a finite one", found))
             }
         }
-    }
-
-    /// Length of the file in bytes.
-    pub fn byte_count(&self) -> usize {
-        self.bytes.len()
     }
 
     fn section(&self, name: &str) -> Result<&Section<'a>, ContainerError> {
