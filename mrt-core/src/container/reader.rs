@@ -60,10 +60,7 @@ impl<'a> Container<'a> {
                 bytes.len(),
             ));
         }
-        Ok(Self {
-            version,
-            sections,
-        })
+        Ok(Self { version, sections })
     }
 
     /// Version of the content.
