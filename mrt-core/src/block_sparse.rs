@@ -109,9 +109,14 @@ impl<T: Scalar> BlockSparse<T> {
     /// # Panics
     /// If a slice has the wrong length.
     pub fn multiply(&self, x: &[T], channels: usize, y: &mut [T]) {
-        assert_eq!(x.len(), self.columns() * channels, "input length");
         assert_eq!(y.len(), self.rows() * channels, "output length");
         y.fill(T::default());
+        self.multiply_add(x, channels, y);
+    }
+
+    /// `y += self * x`, as [`BlockSparse::multiply`].
+    fn multiply_add(&self, x: &[T], channels: usize, y: &mut [T]) {
+        assert_eq!(x.len(), self.columns() * channels, "input length");
         for (row, column, block) in self.blocks() {
             let from = self.column_offsets[column] * channels;
             let to = self.row_offsets[row] * channels;

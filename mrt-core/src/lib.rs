@@ -11,6 +11,7 @@ pub mod block_sparse;
 pub mod bvh;
 pub mod container;
 pub mod cube;
+pub mod cube_symmetry;
 pub mod form_factor;
 pub mod hexahedron;
 pub mod matrix;

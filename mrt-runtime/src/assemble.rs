@@ -1,23 +1,34 @@
 //! Joins a level and a dictionary into a scene (Loos et al. 2011, sections 6.2 and 6.3).
 
 use crate::atlas::AtlasLayout;
-use crate::dictionary::{Dictionary, InterfaceOperators};
+use crate::dictionary::Dictionary;
 use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::propagate;
-use crate::scene::{Beyond, Interface, Portal, Scene, SceneBlock, SceneShape};
-use crate::shape::Shape;
-use glam::DVec3;
+use crate::path::hole_of;
+use crate::scene::{Beyond, Portal, Scene, SceneBlock, SceneShape, Transport};
+use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::matrix::Matrix;
 
 /// Settings of [`assemble`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct AssembleConfig {
+    /// How light is taken from block to block.
+    pub coupling: Coupling,
     /// Openings that light may cross, at most: `d_max`. Further blocks read 0 from the source.
     pub max_depth: usize,
     /// Bytes that texels and `T_b->r` may take together.
     pub max_bytes: usize,
+}
+
+/// How light is taken from block to block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Coupling {
+    /// By the dictionary's operator of each whole path of openings.
+    #[default]
+    Table,
+    /// By lightfields passed on from opening to opening, as in the paper.
+    Lightfield,
 }
 
 /// Largest [`AssembleConfig::max_depth`]: rings of blocks would be followed for ever.
@@ -30,6 +41,7 @@ impl Default for AssembleConfig {
     /// Eight openings and 2 GiB: of what one-bounce light crosses that many, under 0.1 % arrives.
     fn default() -> Self {
         Self {
+            coupling: Coupling::default(),
             max_depth: 8,
             max_bytes: 2 << 30,
         }
@@ -71,7 +83,8 @@ pub enum AssembleError {
     /// Two openings meet with their up directions turned or mirrored against each other.
     #[error(
         "face {face} of block {block} meets face {other_face} of block {other} with its up direction \
-         towards {found}; expected +y on both sides (turn or mirror one block)"
+         towards {found}; expected +y on both sides (turn one block, or use a dictionary with vertical \
+         openings, such as the set cubes-3d)"
     )]
     RolledInterface {
         /// One block.
@@ -125,19 +138,21 @@ pub fn assemble(
         texel_positions: Vec::new(),
         texel_normals: Vec::new(),
         texel_albedo: Vec::new(),
-        response_from_coefficients: BlockSparse::from_blocks(&[], &[], Vec::new()),
+        texel_emission: Vec::new(),
+        transport: Transport {
+            steady: BlockSparse::from_blocks(&[], &[], Vec::new()),
+            gated: Vec::new(),
+        },
         coefficient_count: blocks.last().map_or(0, |b| b.coefficients.end),
-        response_count: blocks
-            .iter()
-            .flat_map(|b| &b.interfaces)
-            .map(|i| i.responses.len())
-            .sum(),
+        joint_count: blocks.last().map_or(0, |b| b.joint.end),
+        doors: level.doors.iter().map(|door| door.value).collect(),
+        probes: dictionary.probes,
         atlas: AtlasLayout::new(&blocks, resolution),
         blocks,
     };
     place_texels(&mut scene, level);
-    scene.response_from_coefficients =
-        propagate::response_from_coefficients(&scene, dictionary, &used, config, operator_bytes)?;
+    scene.transport =
+        propagate::joint_from_coefficients(&scene, dictionary, &used, config, operator_bytes)?;
     Ok(scene)
 }
 
@@ -169,33 +184,29 @@ fn place_blocks(
     used: &[usize],
 ) -> Result<Vec<SceneBlock>, AssembleError> {
     let neighbours = level.neighbours();
+    let doors = level.door_of_openings();
     let mut blocks = Vec::with_capacity(level.blocks.len());
-    let (mut texel, mut coefficient, mut response) = (0, 0, 0);
+    let (mut texel, mut coefficient, mut joint) = (0, 0, 0);
     for (index, block) in level.blocks.iter().enumerate() {
         let shape_index = used
             .iter()
             .position(|&k| dictionary.shapes[k].shape == block.shape)
             .unwrap_or(0);
-        let modes = dictionary.shapes[used[shape_index]].modes();
+        let entry = &dictionary.shapes[used[shape_index]];
+        let (modes, joint_modes) = (entry.modes(), entry.joint_modes());
         let texels = block.shape.texel_count(dictionary.resolution);
         let mut beyond = [Beyond::Wall; 6];
-        let mut interfaces = Vec::new();
-        for (opening, &face) in block.shape.openings.iter().enumerate() {
+        for opening in block.shape.openings {
+            let face = opening.face;
             let turned = block.orientation.face(face);
             beyond[face.index()] = match neighbours[index][turned.index()] {
                 None => Beyond::Outside,
                 Some(there) => {
-                    let count = dictionary.interface.response_from_lightfield.rows();
-                    interfaces.push(Interface {
-                        opening,
-                        responses: response..response + count,
-                    });
-                    response += count;
                     let here = Opening {
                         block: index,
                         face: turned,
                     };
-                    crossing(level, here, there)?
+                    crossing(level, dictionary, here, there)?
                 }
             };
         }
@@ -205,23 +216,32 @@ fn place_blocks(
             shape_index,
             shape: block.shape,
             orientation: block.orientation,
-            portals: portals.map(|&face| Portal::new(&warp, face)).collect(),
+            portals: portals.map(|opening| Portal::new(&warp, opening)).collect(),
             bounds: warp.bounds(),
             warp,
             beyond,
             texels: texel..texel + texels,
             coefficients: coefficient..coefficient + modes,
-            interfaces,
+            joint: joint..joint + joint_modes,
+            doors: std::array::from_fn(|face| {
+                doors[index][block.orientation.face(Face::ALL[face]).index()]
+            }),
         });
         texel += texels;
         coefficient += modes;
+        joint += joint_modes;
     }
     Ok(blocks)
 }
 
 /// How the canonical cubes on both sides of a connection stand to each other, read off the corners that
 /// meet.
-fn crossing(level: &Level, here: Opening, there: Opening) -> Result<Beyond, AssembleError> {
+fn crossing(
+    level: &Level,
+    dictionary: &Dictionary,
+    here: Opening,
+    there: Opening,
+) -> Result<Beyond, AssembleError> {
     let canonical_face =
         |end: Opening| level.blocks[end.block].orientation.inverse().face(end.face);
     let (face_here, face_there) = (canonical_face(here), canonical_face(there));
@@ -266,8 +286,15 @@ fn crossing(level: &Level, here: Opening, there: Opening) -> Result<Beyond, Asse
         _ => None,
     };
     let up = image_of(1);
-    let proper =
-        rotation.filter(|r| up == Some(Face::PosY) && Some(r.face(Face::PosZ)) == image_of(2));
+    // Holes know which way is up, and so do dictionaries whose shapes open sideways only.
+    let outline = level.blocks[here.block].shape.opening(face_here);
+    let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
+    let keeps_up = match up {
+        Some(Face::PosY) => true,
+        Some(Face::NegY) => !has_hole,
+        _ => dictionary.has_exchanges() && !has_hole,
+    };
+    let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == image_of(2));
     match proper {
         Some(here_from_there) => Ok(Beyond::Block {
             block: there.block,
@@ -294,7 +321,11 @@ fn place_texels(scene: &mut Scene, level: &Level) {
                 .push(placed.warp.point(unit).as_vec3());
             scene.texel_normals.push(normal.as_vec3());
             let turned = placed.orientation.face(face);
-            scene.texel_albedo.push(block.albedo[turned.index()]);
+            // What is in a hole neither reflects nor emits.
+            let is_wall = !placed.shape.is_in_hole(face, unit);
+            let of_wall = |colour: Vec3| if is_wall { colour } else { Vec3::ZERO };
+            scene.texel_albedo.push(of_wall(block.albedo[turned.index()]));
+            scene.texel_emission.push(of_wall(block.emission[turned.index()]));
         }
     }
 }
@@ -303,50 +334,8 @@ fn scene_shape(dictionary: &Dictionary, index: usize) -> SceneShape {
     let entry = &dictionary.shapes[index];
     SceneShape {
         coefficients_from_direct: entry.coefficients_from_direct.clone(),
-        indirect_basis: entry.indirect_basis.clone(),
-        response_bases: entry
-            .shape
-            .openings
-            .iter()
-            .map(|&opening| {
-                response_basis_at(
-                    &dictionary.interface,
-                    entry.shape,
-                    opening,
-                    dictionary.resolution,
-                )
-            })
-            .collect(),
+        joint_basis: entry.joint_basis.clone(),
+        probe_basis: entry.probe_basis.clone(),
+        vector_basis: entry.vector_basis.clone(),
     }
-}
-
-/// `U_r` for light that enters a shape through one of its openings: the canonical interface's rows, turned
-/// about +Y to that opening, for the walls that the shape has.
-fn response_basis_at(
-    interface: &InterfaceOperators,
-    shape: &Shape,
-    opening: Face,
-    resolution: usize,
-) -> Matrix<f32> {
-    let canonical = entering_frame(opening).inverse();
-    let rows: Vec<usize> = shape
-        .texels(resolution)
-        .map(|(face, point)| {
-            receiver_texel(canonical.face(face), canonical.point(point), resolution)
-        })
-        .collect();
-    interface.response_basis.selected_rows(&rows)
-}
-
-/// Takes the canonical interface, entered towards +z, to an opening entered from outside.
-///
-/// Openings are side faces, as in every shape; any other would count as entered towards +z.
-pub(crate) fn entering_frame(opening: Face) -> CubeRotation {
-    CubeRotation::about_y_to(opening.opposite()).unwrap_or(CubeRotation::IDENTITY)
-}
-
-/// Row of a texel among the five walls of the cube open at -z.
-fn receiver_texel(face: Face, center: DVec3, resolution: usize) -> usize {
-    let wall = face.index() - usize::from(face > Face::NegZ);
-    wall * resolution * resolution + face.texel_index(center, resolution)
 }

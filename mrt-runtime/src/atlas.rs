@@ -5,6 +5,7 @@
 //! creases inside a block it repeats the wall's own edge.
 
 use crate::scene::{Beyond, SceneBlock};
+use crate::shape::Shape;
 use glam::{DVec3, Vec2};
 use mrt_core::cube::Face;
 
@@ -175,11 +176,26 @@ fn texel_seen(
         (Some(side), None) => beside(blocks, here, side, corner(v, row, last)),
         (None, Some(side)) => beside(blocks, here, side, corner(u, column, last)),
     };
-    let offset = blocks[seen.block]
-        .shape
-        .wall_offset(seen.wall, resolution)?;
-    let texel = seen.wall.texel_index(seen.point, resolution);
+    let shape = blocks[seen.block].shape;
+    let offset = shape.wall_offset(seen.wall, resolution)?;
+    let texel = texel_of_wall(shape, seen.wall, seen.point, resolution);
     Some((seen.block, offset + texel))
+}
+
+/// The texel at a point, or the nearest that is wall where there is a hole.
+fn texel_of_wall(shape: &Shape, wall: Face, point: DVec3, resolution: usize) -> usize {
+    let texel = wall.texel_index(point, resolution);
+    let center = |k: usize| wall.texel_center(resolution, k / resolution, k % resolution);
+    if !shape.is_in_hole(wall, center(texel)) {
+        return texel;
+    }
+    (0..resolution * resolution)
+        .filter(|&k| !shape.is_in_hole(wall, center(k)))
+        .min_by(|&a, &b| {
+            let distance = |k: usize| center(k).distance(center(texel));
+            distance(a).total_cmp(&distance(b))
+        })
+        .unwrap_or(texel)
 }
 
 /// The side that an outermost texel touches.
@@ -219,6 +235,10 @@ fn walk<const N: usize>(
         else {
             return (k, here);
         };
+        // Around a hole there is a wall between the blocks.
+        if !blocks[here.block].shape.is_open(side) {
+            return (k, here);
+        }
         let there_from_here = here_from_there.inverse();
         let wall = there_from_here.face(here.wall);
         if blocks[block].shape.is_open(wall) {

@@ -1,5 +1,6 @@
 //! The dictionary as a running game holds it: the operators of the canonical shapes, in `f32`.
 
+use crate::path::Word;
 use crate::shape::Shape;
 use mrt_core::matrix::Matrix;
 
@@ -12,10 +13,16 @@ pub struct Dictionary {
     pub settings: String,
     /// Texels along an edge of a wall.
     pub resolution: usize,
+    /// Probes along an edge of a block; 0 if it was baked without.
+    pub probes: usize,
     /// One entry a shape; no shape twice.
     pub shapes: Vec<ShapeOperators>,
-    /// Operators of the interface that all shapes share.
-    pub interface: InterfaceOperators,
+    /// How lightfields pass from opening to opening.
+    pub lightfields: LightfieldOperators,
+    /// How light passes along whole paths of openings.
+    pub paths: PathTable,
+    /// What re-gathering and rebuilding warped shapes needs; `None` in packed dictionaries.
+    pub sources: Option<Sources>,
 }
 
 /// Operators of one shape; "texels" counts those of the shape's walls ([`Shape::texels`]).
@@ -25,37 +32,94 @@ pub struct ShapeOperators {
     pub shape: &'static Shape,
     /// `T_d->b`, modes x texels: coefficients from outgoing radiosity.
     pub coefficients_from_direct: Matrix<f32>,
-    /// `U_b`, texels x modes: indirect irradiance from coefficients.
-    pub indirect_basis: Matrix<f32>,
-    /// `L_imp`, texels x modes: radiosity whose indirect light the basis is.
+    /// The joint basis, texels x joint modes: indirect irradiance from joint coefficients. Its first columns
+    /// are `U_b`, one a coefficient b; the others hold what light from other blocks adds.
+    pub joint_basis: Matrix<f32>,
+    /// The same for probes, 9 probes³ x joint modes: nine SH coefficients of incident radiance a probe,
+    /// probes with x fastest, then y, then z.
+    pub probe_basis: Matrix<f32>,
+    /// The same for vector irradiance, 4 texels x joint modes (four OHLSH coefficients, texel by texel), or no
+    /// rows if it was baked without.
+    pub vector_basis: Matrix<f32>,
+    /// In the order of [`Shape::openings`].
+    pub openings: Vec<OpeningOperators>,
+    /// `L_imp`, texels x modes: radiosity whose indirect light `U_b` is; no columns in packed dictionaries.
     pub implicit_lighting: Matrix<f32>,
-    /// `R_b->rlf`, lightfield modes x modes, for each opening in the order of [`Shape::openings`].
-    pub lightfield_from_coefficients: Vec<Matrix<f32>>,
     /// Singular values of the modes, largest first.
     pub singular_values: Vec<f32>,
     /// Fraction that the modes left out hold of M's energy beyond its first mode (uniform light, whose size
     /// the enrichment sets).
     pub dropped_energy: f32,
+    /// Fraction that the joint basis leaves out of the light that comes from other blocks.
+    pub joint_dropped_energy: f32,
 }
 
-/// Operators of the canonical interface: the face z = 0 crossed towards +z.
+/// Operators of one opening of a shape, in the frame of
+/// [`frame_of_heading`](crate::path::frame_of_heading). Lists of two hold the same in the frame with x and y
+/// exchanged; sets without vertical openings need one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct InterfaceOperators {
-    /// Lightfield at the opening straight ahead from the one entered: modes x modes.
+pub struct OpeningOperators {
+    /// `R_b->rlf`, lightfield modes x modes: the lightfield that leaves.
+    pub lightfield_from_coefficients: Matrix<f32>,
+    /// Emission modes x modes: what a path's operator takes.
+    pub emission_from_coefficients: Vec<Matrix<f32>>,
+    /// Joint modes x response modes: what light that enters becomes.
+    pub joint_from_response: Vec<Matrix<f32>>,
+}
+
+/// Operators of the canonical interface, the face z = 0 crossed towards +z, in the reduced lightfield basis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LightfieldOperators {
+    /// Parity of each mode: bit 0 set if odd in x, bit 1 if odd in y.
+    pub parity: Vec<u8>,
+    /// At the opening straight ahead from the one entered: modes x modes.
     pub straight: Matrix<f32>,
-    /// At the opening on the left (towards +x).
+    /// At the opening on the left (towards +x); the one on the right follows by the mirror.
     pub left: Matrix<f32>,
-    /// At the opening on the right (towards -x).
-    pub right: Matrix<f32>,
+    /// The same lightfield with x and y exchanged, modes x modes; no rows in sets without vertical openings.
+    pub exchange: Matrix<f32>,
+    /// What passes each of [`Hole::ALL`](crate::shape::Hole::ALL), modes x modes; empty in sets without holes.
+    pub holes: Vec<Matrix<f32>>,
     /// `T_rlf->r`, response modes x lightfield modes.
     pub response_from_lightfield: Matrix<f32>,
-    /// `U_r`, texels x response modes, on the five walls of the cube open at -z.
-    pub response_basis: Matrix<f32>,
     /// Fraction that the modes left out hold of the emitted and propagated lightfields' energy beyond their
     /// first mode.
-    pub lightfield_dropped_energy: f32,
-    /// Fraction that the modes left out hold of the response's energy beyond its first mode.
+    pub dropped_energy: f32,
+}
+
+/// One operator for each canonical path of openings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathTable {
+    /// Parity of each emission mode: bit 0 set if odd in x, bit 1 if odd in y.
+    pub emission_parity: Vec<u8>,
+    /// The same of each response mode.
+    pub response_parity: Vec<u8>,
+    /// In ascending order of words, each once.
+    pub entries: Vec<PathEntry>,
+    /// Fraction that the emission modes leave out of what shapes send through their openings.
+    pub emission_dropped_energy: f32,
+    /// Fraction that the response modes leave out of what arrives.
     pub response_dropped_energy: f32,
+}
+
+/// The operator of one path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathEntry {
+    /// The path.
+    pub word: Word,
+    /// Response modes x emission modes.
+    pub response_from_emission: Matrix<f32>,
+}
+
+/// Bases in texel space that only tools need.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sources {
+    /// Emission modes x texels of the canonical emitter (the cube open at +z): emission coefficients from
+    /// radiosity.
+    pub emission_from_radiosity: Matrix<f32>,
+    /// Texels of the canonical receiver (the cube open at -z), then nine SH coefficients for each of its probes,
+    /// x response modes.
+    pub response_basis: Matrix<f32>,
 }
 
 impl Dictionary {
@@ -64,17 +128,43 @@ impl Dictionary {
         self.shapes.iter().position(|entry| entry.shape == shape)
     }
 
+    /// Number of response modes.
+    pub fn response_modes(&self) -> usize {
+        self.paths.response_parity.len()
+    }
+
+    /// True when openings may meet with their up directions a quarter turn apart.
+    pub fn has_exchanges(&self) -> bool {
+        self.shapes
+            .iter()
+            .flat_map(|shape| &shape.openings)
+            .all(|opening| opening.emission_from_coefficients.len() == 2)
+    }
+
     /// Bytes of all matrices.
     pub fn bytes(&self) -> usize {
-        let interface = &self.interface;
-        let shared = [
-            &interface.straight,
-            &interface.left,
-            &interface.right,
-            &interface.response_from_lightfield,
-            &interface.response_basis,
-        ];
-        let shared: usize = shared.into_iter().map(matrix_bytes).sum();
+        let fields = &self.lightfields;
+        let shared: usize = [
+            &fields.straight,
+            &fields.left,
+            &fields.exchange,
+            &fields.response_from_lightfield,
+        ]
+        .into_iter()
+        .chain(&fields.holes)
+        .chain(
+            self.paths
+                .entries
+                .iter()
+                .map(|entry| &entry.response_from_emission),
+        )
+        .chain(
+            self.sources
+                .iter()
+                .flat_map(|s| [&s.emission_from_radiosity, &s.response_basis]),
+        )
+        .map(matrix_bytes)
+        .sum();
         shared + self.shapes.iter().map(ShapeOperators::bytes).sum::<usize>()
     }
 }
@@ -86,18 +176,30 @@ fn matrix_bytes(matrix: &Matrix<f32>) -> usize {
 impl ShapeOperators {
     /// Number of modes `k_b`.
     pub fn modes(&self) -> usize {
-        self.indirect_basis.columns()
+        self.coefficients_from_direct.rows()
+    }
+
+    /// Number of joint modes: those of light from the block itself and what light from others needs beyond.
+    pub fn joint_modes(&self) -> usize {
+        self.joint_basis.columns()
     }
 
     /// Bytes of this shape's matrices.
     pub fn bytes(&self) -> usize {
+        let of_openings = self.openings.iter().flat_map(|opening| {
+            std::iter::once(&opening.lightfield_from_coefficients)
+                .chain(&opening.emission_from_coefficients)
+                .chain(&opening.joint_from_response)
+        });
         [
             &self.coefficients_from_direct,
-            &self.indirect_basis,
+            &self.joint_basis,
+            &self.probe_basis,
+            &self.vector_basis,
             &self.implicit_lighting,
         ]
         .into_iter()
-        .chain(&self.lightfield_from_coefficients)
+        .chain(of_openings)
         .map(matrix_bytes)
         .sum()
     }

@@ -12,6 +12,7 @@ use mrt_core::radiometry::sphere_light_irradiance;
 pub(crate) fn direct_light<V: Visibility>(
     scene: &Scene,
     lights: &[PlacedLight],
+    doors: &[f32],
     visibility: &V,
     direct: &mut [f32],
 ) {
@@ -29,7 +30,7 @@ pub(crate) fn direct_light<V: Visibility>(
             };
             let mut sum = Vec3::ZERO;
             for light in lights {
-                sum += irradiance(scene, light, receiver, normal, visibility);
+                sum += irradiance(scene, light, doors, receiver, normal, visibility);
             }
             (red[k], green[k], blue[k]) = (sum.x, sum.y, sum.z);
         }
@@ -40,6 +41,7 @@ pub(crate) fn direct_light<V: Visibility>(
 pub fn irradiance<V: Visibility>(
     scene: &Scene,
     placed: &PlacedLight,
+    doors: &[f32],
     receiver: Receiver,
     normal: DVec3,
     visibility: &V,
@@ -92,7 +94,7 @@ pub fn irradiance<V: Visibility>(
     if unshadowed == Vec3::ZERO {
         return Vec3::ZERO;
     }
-    let fraction = visibility.fraction(scene, receiver, toward);
+    let fraction = visibility.fraction(scene, doors, receiver, toward);
     // Callers' functions may return anything: what is not a positive number lets no light through.
     if fraction > 0.0 {
         unshadowed * fraction.min(1.0)

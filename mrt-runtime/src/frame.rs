@@ -39,10 +39,8 @@ pub struct StageTimes {
     pub coefficients: Duration,
     /// `r = T_b->r b`.
     pub responses: Duration,
-    /// `U_b b`.
-    pub own_indirect: Duration,
-    /// `U_r r`.
-    pub foreign_indirect: Duration,
+    /// Irradiance from the joint basis, `U_b b + U_r r`.
+    pub indirect: Duration,
     /// Lightmap atlas.
     pub atlas: Duration,
 }
@@ -53,8 +51,7 @@ impl StageTimes {
         self.direct
             + self.coefficients
             + self.responses
-            + self.own_indirect
-            + self.foreign_indirect
+            + self.indirect
             + self.atlas
     }
 }
@@ -69,7 +66,8 @@ pub struct Frame {
     direct: Vec<f32>,
     radiosity: Vec<f32>,
     coefficients: Vec<f32>,
-    responses: Vec<f32>,
+    joint: Vec<f32>,
+    doors: Vec<f32>,
     indirect: Vec<f32>,
     previous: Vec<f32>,
     lightmap: Vec<[f32; 3]>,
@@ -102,6 +100,16 @@ pub enum FrameError {
         /// Position of the first that is negative, too large or NaN.
         faulty: Option<usize>,
     },
+    /// No such door, or not a value for one.
+    #[error("door {door} is set to {found}; expected one of {count} doors and a value in [0, 1]")]
+    Door {
+        /// The door given.
+        door: usize,
+        /// Doors in the scene.
+        count: usize,
+        /// The value given.
+        found: f32,
+    },
     /// The buffers were made for a scene of another size.
     #[error("the frame's buffers hold {expected} {what}; the scene has {found}")]
     OtherScene {
@@ -123,7 +131,8 @@ impl Frame {
             direct: vec![0.0; texels],
             radiosity: vec![0.0; texels],
             coefficients: vec![0.0; 3 * scene.coefficient_count],
-            responses: vec![0.0; 3 * scene.response_count],
+            joint: vec![0.0; 3 * scene.joint_count],
+            doors: scene.doors.clone(),
             indirect: vec![0.0; texels],
             previous: vec![0.0; texels],
             lightmap: vec![[0.0; 3]; scene.atlas.width * scene.atlas.height],
@@ -145,7 +154,13 @@ impl Frame {
     ) -> Result<(), FrameError> {
         self.check(scene, lights)?;
         let start = Instant::now();
-        direct_light(scene, &self.lights, visibility, &mut self.direct);
+        direct_light(
+            scene,
+            &self.lights,
+            &self.doors,
+            visibility,
+            &mut self.direct,
+        );
         self.times = StageTimes {
             direct: start.elapsed(),
             ..StageTimes::default()
@@ -201,7 +216,8 @@ impl Frame {
                 self.coefficients.len() / 3,
                 scene.coefficient_count,
             ),
-            ("responses", self.responses.len() / 3, scene.response_count),
+            ("joint coefficients", self.joint.len() / 3, scene.joint_count),
+            ("doors", self.doors.len(), scene.doors.len()),
             ("lightmap pixels", self.lightmap.len(), pixels),
         ] {
             if found != expected {
@@ -239,7 +255,7 @@ impl Frame {
         if bounces != Bounces::Feedback {
             self.indirect.fill(0.0);
             self.coefficients.fill(0.0);
-            self.responses.fill(0.0);
+            self.joint.fill(0.0);
         }
         self.passes = 0;
         while self.passes < limit {
@@ -261,19 +277,43 @@ impl Frame {
         coefficients_from_radiosity(scene, &self.radiosity, &mut self.coefficients);
         let after_coefficients = Instant::now();
         scene
-            .response_from_coefficients
-            .multiply(&self.coefficients, 3, &mut self.responses);
+            .transport
+            .multiply(&self.coefficients, &self.doors, &mut self.joint);
+        add_own(scene, &self.coefficients, &mut self.joint);
         let after_responses = Instant::now();
-        own_indirect(scene, &self.coefficients, &mut self.indirect);
-        let after_own = Instant::now();
-        add_foreign_indirect(scene, &self.responses, &mut self.indirect);
+        indirect_from_joint(scene, &self.joint, &mut self.indirect);
         // Truncated bases leave small negative values; they end here, once, on the final sum.
         self.indirect.iter_mut().for_each(|e| *e = e.max(0.0));
+        limit_flux(scene, &self.radiosity, &mut self.indirect);
         let end = Instant::now();
         self.times.coefficients += after_coefficients - start;
         self.times.responses += after_responses - after_coefficients;
-        self.times.own_indirect += after_own - after_responses;
-        self.times.foreign_indirect += end - after_own;
+        self.times.indirect += end - after_responses;
+    }
+
+    /// Opens or closes a door: 1 lets everything through, 0 nothing; what does not pass is lost. The next
+    /// frame sees it.
+    ///
+    /// # Errors
+    /// [`FrameError::Door`], if there is no such door or the value is not in [0, 1].
+    pub fn set_door(&mut self, door: usize, value: f32) -> Result<(), FrameError> {
+        let count = self.doors.len();
+        match self.doors.get_mut(door) {
+            Some(place) if (0.0..=1.0).contains(&value) => {
+                *place = value;
+                Ok(())
+            }
+            _ => Err(FrameError::Door {
+                door,
+                count,
+                found: value,
+            }),
+        }
+    }
+
+    /// Value of each door.
+    pub fn doors(&self) -> &[f32] {
+        &self.doors
     }
 
     /// Direct irradiance, W/m².
@@ -318,7 +358,7 @@ impl Frame {
     }
 }
 
-/// radiosity = albedo (direct + indirect)
+/// radiosity = albedo (direct + indirect) + emission
 fn reflect(scene: &Scene, direct: &[f32], indirect: &[f32], radiosity: &mut [f32]) {
     for block in &scene.blocks {
         let count = block.texels.len();
@@ -326,7 +366,8 @@ fn reflect(scene: &Scene, direct: &[f32], indirect: &[f32], radiosity: &mut [f32
             let start = 3 * block.texels.start + channel * count;
             for (k, texel) in block.texels.clone().enumerate() {
                 let incident = direct[start + k] + indirect[start + k];
-                radiosity[start + k] = scene.texel_albedo[texel][channel] * incident;
+                radiosity[start + k] = scene.texel_albedo[texel][channel] * incident
+                    + scene.texel_emission[texel][channel];
             }
         }
     }
@@ -344,29 +385,62 @@ fn coefficients_from_radiosity(scene: &Scene, radiosity: &[f32], coefficients: &
     }
 }
 
-/// `U_b b`
-fn own_indirect(scene: &Scene, coefficients: &[f32], indirect: &mut [f32]) {
-    indirect.fill(0.0);
+/// A block's own coefficients are the first of its joint ones.
+fn add_own(scene: &Scene, coefficients: &[f32], joint: &mut [f32]) {
     for block in &scene.blocks {
-        let basis = &scene.shapes[block.shape_index].indirect_basis;
-        let b = &coefficients[3 * block.coefficients.start..3 * block.coefficients.end];
-        let b = MatrixView::new(block.coefficients.len(), 3, b);
-        let out = &mut indirect[3 * block.texels.start..3 * block.texels.end];
-        multiply_add(basis.view(), b, out);
+        let (own, all) = (block.coefficients.len(), block.joint.len());
+        for channel in 0..3 {
+            let from = 3 * block.coefficients.start + channel * own;
+            let to = 3 * block.joint.start + channel * all;
+            for (sum, &b) in joint[to..to + own]
+                .iter_mut()
+                .zip(&coefficients[from..from + own])
+            {
+                *sum += b;
+            }
+        }
     }
 }
 
-/// `+ U_r r`
-fn add_foreign_indirect(scene: &Scene, responses: &[f32], indirect: &mut [f32]) {
+/// `U_b b + U_r r`, both in the joint basis.
+fn indirect_from_joint(scene: &Scene, joint: &[f32], indirect: &mut [f32]) {
+    indirect.fill(0.0);
     for block in &scene.blocks {
+        let basis = &scene.shapes[block.shape_index].joint_basis;
+        let c = &joint[3 * block.joint.start..3 * block.joint.end];
+        let c = MatrixView::new(block.joint.len(), 3, c);
         let out = &mut indirect[3 * block.texels.start..3 * block.texels.end];
-        for interface in &block.interfaces {
-            let basis = &scene.shapes[block.shape_index].response_bases[interface.opening];
-            let range = &interface.responses;
-            let r = &responses[3 * range.start..3 * range.end];
-            multiply_add(basis.view(), MatrixView::new(range.len(), 3, r), out);
+        multiply_add(basis.view(), c, out);
+    }
+}
+
+/// Scales a channel down where more flux would arrive on all walls than left them.
+///
+/// Exact transport never does that. Where truncated operators did, bounces would grow without end; so total flux
+/// falls by the largest albedo at each bounce, whatever the level. Texels of canonical blocks have equal areas.
+fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
+    for channel in 0..3 {
+        let (mut sent, mut arrived) = (0.0f64, 0.0f64);
+        for block in &scene.blocks {
+            let start = 3 * block.texels.start + channel * block.texels.len();
+            let range = start..start + block.texels.len();
+            sent += sum(&radiosity[range.clone()]);
+            arrived += sum(&indirect[range]);
+        }
+        if arrived > sent {
+            let scale = (sent / arrived) as f32;
+            for block in &scene.blocks {
+                let start = 3 * block.texels.start + channel * block.texels.len();
+                for e in &mut indirect[start..start + block.texels.len()] {
+                    *e *= scale;
+                }
+            }
         }
     }
+}
+
+fn sum(values: &[f32]) -> f64 {
+    values.iter().map(|&x| f64::from(x)).sum()
 }
 
 /// Largest difference over the largest value.

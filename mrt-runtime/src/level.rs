@@ -1,6 +1,7 @@
 //! What a designer edits: warped blocks and the openings through which they are joined.
 
-use crate::shape::Shape;
+use crate::light::MAX_LIGHT_VALUE;
+use crate::shape::{Aperture, Outline, Shape};
 use glam::{DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::{Hexahedron, HexahedronError};
@@ -26,6 +27,17 @@ pub struct Level {
     /// Openings that lead into one another. An opening without a connection leads outside: light
     /// leaves through it, and directional lights shine in.
     pub connections: Vec<Connection>,
+    /// Connections that can be closed while the game runs, in the order in which a frame counts them.
+    pub doors: Vec<Door>,
+}
+
+/// A connection that can be closed, at run time, by any amount.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Door {
+    /// Index into [`Level::connections`].
+    pub connection: usize,
+    /// How much light passes at first, in [0, 1].
+    pub value: f32,
 }
 
 /// One instance of a canonical shape.
@@ -40,6 +52,8 @@ pub struct Block {
     /// Linear RGB albedo in [0, 1] of each face of the turned cube, in the order of [`Face::ALL`];
     /// entries of openings have no meaning.
     pub albedo: [Vec3; 6],
+    /// Radiosity that each face emits of itself, linear RGB, W/m², in the order of [`Face::ALL`].
+    pub emission: [Vec3; 6],
 }
 
 /// One end of a connection: a face of a block's turned cube.
@@ -91,6 +105,52 @@ pub enum LevelError {
         face: Face,
         /// The albedo there.
         found: Vec3,
+    },
+    /// An emission is NaN, negative or absurd.
+    #[error(
+        "block {block}, face {face}: emission {found}; expected three values in [0, {MAX_LIGHT_VALUE:e}]"
+    )]
+    Emission {
+        /// Which block.
+        block: usize,
+        /// Which face.
+        face: Face,
+        /// The emission there.
+        found: Vec3,
+    },
+    /// A door is nowhere, or not a fraction.
+    #[error(
+        "door {door}: connection {connection}, value {found}; expected one of {count} connections, each with \
+         one door at most, and a value in [0, 1]"
+    )]
+    Door {
+        /// Which door.
+        door: usize,
+        /// The connection that it names.
+        connection: usize,
+        /// Number of connections.
+        count: usize,
+        /// Its value.
+        found: f32,
+    },
+    /// Two openings meet whose outlines differ.
+    #[error(
+        "face {face} of block {block} has {found}, and face {other_face} of block {other} {expected}; expected \
+         the same on both sides"
+    )]
+    OutlineMismatch {
+        /// One block.
+        block: usize,
+        /// Its face.
+        face: Face,
+        /// The other block.
+        other: usize,
+        /// Its face.
+        other_face: Face,
+        /// What the other face has.
+        expected: String,
+        /// What the face has.
+        found: String,
     },
     /// A connection names a block that is not there.
     #[error("connection {connection}: block {found}; expected an index below {expected}")]
@@ -194,12 +254,18 @@ impl Block {
             orientation,
             warp,
             albedo: [albedo; 6],
+            emission: [Vec3::ZERO; 6],
         }
     }
 
-    /// True when the face of the turned cube is missing.
+    /// True when the whole face of the turned cube is missing.
     pub fn is_open(&self, face: Face) -> bool {
         self.shape.is_open(self.orientation.inverse().face(face))
+    }
+
+    /// The opening in a face of the turned cube, as the canonical shape has it.
+    pub fn opening(&self, face: Face) -> Option<&'static Aperture> {
+        self.shape.opening(self.orientation.inverse().face(face))
     }
 
     /// The warp as a map from the *canonical* cube: orientation and corners in one.
@@ -225,8 +291,7 @@ impl Level {
     /// One unit block a cell [x, x+1] x [y, y+1] x [z, z+1]; cells that share a face are joined.
     ///
     /// # Errors
-    /// [`CellsError`] when a cell is given twice, or opens upwards or downwards, which none of the
-    /// [`SHAPES`](crate::shape::SHAPES) does.
+    /// [`CellsError`] when a cell is given twice.
     pub fn from_cells(cells: &[[i32; 3]], albedo: Vec3) -> Result<Level, CellsError> {
         let mut index = std::collections::HashMap::new();
         for (block, &cell) in cells.iter().enumerate() {
@@ -330,6 +395,18 @@ impl Level {
                         found: albedo,
                     });
                 }
+                let emission = block.emission[face.index()];
+                let legal = emission
+                    .to_array()
+                    .iter()
+                    .all(|e| (0.0..=MAX_LIGHT_VALUE).contains(e));
+                if !legal {
+                    return Err(LevelError::Emission {
+                        block: index,
+                        face,
+                        found: emission,
+                    });
+                }
             }
         }
         self.check_connections()?;
@@ -345,7 +422,7 @@ impl Level {
                     expected: self.blocks.len(),
                     found: end.block,
                 })?;
-                if !block.is_open(end.face) {
+                if block.opening(end.face).is_none() {
                     return Err(LevelError::NotAnOpening {
                         connection,
                         block: end.block,
@@ -363,9 +440,58 @@ impl Level {
                     });
                 }
             }
+            self.check_outlines(ends)?;
             self.check_interface(ends)?;
         }
+        let mut has_door = vec![false; self.connections.len()];
+        for (index, door) in self.doors.iter().enumerate() {
+            let is_first = has_door
+                .get_mut(door.connection)
+                .is_some_and(|has| !std::mem::replace(has, true));
+            if !is_first || !(0.0..=1.0).contains(&door.value) {
+                return Err(LevelError::Door {
+                    door: index,
+                    connection: door.connection,
+                    count: self.connections.len(),
+                    found: door.value,
+                });
+            }
+        }
         Ok(())
+    }
+
+    /// Joined openings have the same outline.
+    fn check_outlines(&self, ends: &Connection) -> Result<(), LevelError> {
+        let outline = |end: Opening| {
+            let opening = self.blocks[end.block].opening(end.face);
+            opening.map_or(Outline::Whole, |opening| opening.outline)
+        };
+        let (ours, theirs) = (outline(ends.a), outline(ends.b));
+        if ours == theirs {
+            return Ok(());
+        }
+        Err(LevelError::OutlineMismatch {
+            block: ends.a.block,
+            face: ends.a.face,
+            other: ends.b.block,
+            other_face: ends.b.face,
+            expected: theirs.to_string(),
+            found: ours.to_string(),
+        })
+    }
+
+    /// The door in each face of each block's turned cube, as an index into [`Level::doors`].
+    ///
+    /// Doors and connections must be in range; [`Level::check`] says so.
+    pub fn door_of_openings(&self) -> Vec<[Option<u32>; 6]> {
+        let mut doors = vec![[None; 6]; self.blocks.len()];
+        for (index, door) in self.doors.iter().enumerate() {
+            let connection = self.connections[door.connection];
+            for end in [connection.a, connection.b] {
+                doors[end.block][end.face.index()] = Some(index as u32);
+            }
+        }
+        doors
     }
 
     /// Each corner of one face must be near a corner of the other.
@@ -410,8 +536,7 @@ pub enum CellsError {
     },
     /// No shape has these openings.
     #[error(
-        "cell {cell:?} opens towards {openings:?}; the dictionary's shapes open only sideways \
-         (-x, +x, -z, +z)"
+        "cell {cell:?} opens towards {openings:?}; expected the openings of a shape"
     )]
     NoShape {
         /// The cell.
@@ -421,15 +546,15 @@ pub enum CellsError {
     },
 }
 
-/// The shape and the rotation about +Y that leave exactly these faces open.
+/// The shape and the rotation that leave exactly these faces open, about +Y where that is enough.
 pub fn shape_with_openings(open: &[Face]) -> Option<(&'static Shape, CubeRotation)> {
-    crate::shape::SHAPES.iter().find_map(|shape| {
-        (0..4).map(CubeRotation::about_y).find_map(|rotation| {
+    let upright = (0..4).map(CubeRotation::about_y);
+    upright.chain(CubeRotation::all()).find_map(|rotation| {
+        crate::shape::SHAPES.iter().find_map(|shape| {
             let fits = shape.openings.len() == open.len()
-                && shape
-                    .openings
-                    .iter()
-                    .all(|&face| open.contains(&rotation.face(face)));
+                && shape.openings.iter().all(|opening| {
+                    opening.outline == Outline::Whole && open.contains(&rotation.face(opening.face))
+                });
             fits.then_some((shape, rotation))
         })
     })

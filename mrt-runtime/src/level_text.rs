@@ -4,6 +4,7 @@
 //! format = "mrt-level"
 //! version = 1
 //! connections = [[0, "+x", 1, "-x"]]
+//! doors = [[0, 1.0]]           # connection 0 can be closed; at first all its light passes
 //!
 //! [[block]]
 //! shape = "dead_end"
@@ -16,9 +17,10 @@
 //! cell = [1, 0, 0]
 //! albedo = [0.7, 0.7, 0.7]
 //! face_albedo = { "-y" = [0.4, 0.2, 0.1] }
+//! face_emission = { "+y" = [3.0, 3.0, 2.5] }   # W/m², a panel that is lit
 //! ```
 
-use crate::level::{Block, Connection, Level, LevelError, MAX_BLOCKS, Opening};
+use crate::level::{Block, Connection, Door, Level, LevelError, MAX_BLOCKS, Opening};
 use crate::shape::{SHAPES, Shape};
 use glam::{DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};
@@ -116,6 +118,8 @@ struct LevelText {
     version: u32,
     #[serde(default)]
     connections: Vec<(usize, String, usize, String)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    doors: Vec<(usize, f32)>,
     #[serde(default, rename = "block")]
     blocks: Vec<BlockText>,
 }
@@ -135,6 +139,8 @@ struct BlockText {
     albedo: [f32; 3],
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     face_albedo: BTreeMap<String, [f32; 3]>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    face_emission: BTreeMap<String, [f32; 3]>,
 }
 
 /// Reads and checks a level.
@@ -183,9 +189,15 @@ pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
             })
         })
         .collect::<Result<_, LevelTextError>>()?;
+    let doors = text
+        .doors
+        .iter()
+        .map(|&(connection, value)| Door { connection, value })
+        .collect();
     let level = Level {
         blocks,
         connections,
+        doors,
     };
     level.check()?;
     Ok(level)
@@ -237,6 +249,10 @@ fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
         let face = read_face(name, || format!("block {index}"))?;
         block.albedo[face.index()] = Vec3::from_array(*albedo);
     }
+    for (name, emission) in &text.face_emission {
+        let face = read_face(name, || format!("block {index}"))?;
+        block.emission[face.index()] = Vec3::from_array(*emission);
+    }
     Ok(block)
 }
 
@@ -262,6 +278,11 @@ pub fn to_text(level: &Level) -> Result<String, LevelTextError> {
                 let name = |face: Face| face.name().to_owned();
                 (c.a.block, name(c.a.face), c.b.block, name(c.b.face))
             })
+            .collect(),
+        doors: level
+            .doors
+            .iter()
+            .map(|door| (door.connection, door.value))
             .collect(),
         blocks: level.blocks.iter().map(write_block).collect(),
     };
@@ -296,6 +317,14 @@ fn write_block(block: &Block) -> BlockText {
         corners: (!is_cuboid).then(|| block.warp.corners.map(|corner| corner.to_array())),
         albedo: common.to_array(),
         face_albedo: others.collect(),
+        face_emission: Face::ALL
+            .into_iter()
+            .filter(|face| block.emission[face.index()] != Vec3::ZERO)
+            .map(|face| {
+                let emission = block.emission[face.index()].to_array();
+                (face.name().to_owned(), emission)
+            })
+            .collect(),
     }
 }
 
@@ -307,6 +336,11 @@ mod tests {
         let cells = [[0, 0, 0], [1, 0, 0], [1, 0, 1]];
         let mut level = Level::from_cells(&cells, Vec3::splat(0.7)).expect("flat cells");
         level.blocks[1].albedo[Face::NegY.index()] = Vec3::new(0.4, 0.2, 0.1);
+        level.blocks[0].emission[Face::PosY.index()] = Vec3::new(3.0, 2.0, 1.0 / 3.0);
+        level.doors.push(Door {
+            connection: 1,
+            value: 0.3,
+        });
         level.blocks[2].warp.corners[7] += DVec3::new(0.1, 0.2, 1.0 / 3.0);
         level
     }

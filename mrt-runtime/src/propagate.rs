@@ -2,179 +2,164 @@
 //! section 6.3).
 //!
 //! A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of
-//! openings that turns back carries nothing and is left out; the paper follows all sequences breadth
-//! first. Sequences that reach an opening with the same set of headings behind them are summed before they
-//! go on, since open rooms have binomially many.
+//! openings that turns back carries nothing and is left out; the paper follows all sequences. Either the
+//! dictionary's table has the operator of a whole sequence ([`table`]), or lightfields are passed on from opening
+//! to opening as in the paper ([`lightfield`]). Both give responses at the openings that light enters through,
+//! and those are projected on the joint basis of the block behind, where the paper keeps a basis for each opening.
 
-use crate::assemble::{AssembleConfig, AssembleError, entering_frame};
+mod lightfield;
+mod table;
+
+use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::Dictionary;
-use crate::scene::{Beyond, Scene, SceneBlock};
+use crate::path::Roll;
+use crate::scene::{Gate, Scene, Transport};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::matrix::{Matrix, multiply};
+use mrt_core::cube_symmetry::CubeSymmetry;
+use mrt_core::matrix::{Matrix, multiply, multiply_add};
 use std::collections::BTreeMap;
 
-/// Light of one source block about to enter a block.
-struct Wave {
-    /// Takes the entered block's canonical directions to the source's.
-    source_from_here: CubeRotation,
-    /// Lightfield modes x source modes.
-    lightfield: Matrix<f32>,
+/// Responses of one source, summed by where they enter.
+type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
+
+/// Where and how light enters a block.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct ArrivalKey {
+    /// Doors on the way, ascending.
+    doors: Vec<u32>,
+    block: usize,
+    /// The canonical face entered.
+    face: Face,
+    /// True if the response's frame has x and y exchanged.
+    exchanged: bool,
 }
 
-/// Which waves are summed: (block entered, its canonical face, headings used so far as bits of
-/// [`Face::index`] in the source's frame, image of +x in that frame).
-type WaveKey = (usize, Face, u8, Face);
-
-/// Assembles the operator from all blocks' coefficients to all interfaces' responses.
-pub(crate) fn response_from_coefficients(
+/// Assembles the operator from all blocks' coefficients b to all blocks' joint coefficients.
+pub(crate) fn joint_from_coefficients(
     scene: &Scene,
     dictionary: &Dictionary,
     used_shapes: &[usize],
     config: &AssembleConfig,
     max_bytes: usize,
-) -> Result<BlockSparse<f32>, AssembleError> {
-    let mut interface_index = BTreeMap::new();
-    let mut row_sizes = Vec::new();
-    for (block, placed) in scene.blocks.iter().enumerate() {
-        for interface in &placed.interfaces {
-            let face = placed.shape.openings[interface.opening];
-            interface_index.insert((block, face), row_sizes.len());
-            row_sizes.push(interface.responses.len());
-        }
-    }
-    let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
-    let response = &dictionary.interface.response_from_lightfield;
-    let mut blocks = Vec::new();
+) -> Result<Transport, AssembleError> {
+    let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
+    let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
-    for (source, placed) in scene.blocks.iter().enumerate() {
-        let emission = &dictionary.shapes[used_shapes[placed.shape_index]];
-        let arrived = follow(
-            scene,
-            dictionary,
-            placed,
-            &emission.lightfield_from_coefficients,
-            config.max_depth,
-        );
-        for (entered, lightfield) in arrived {
-            let row = interface_index[&entered];
-            let block = multiply(response.view(), lightfield.view());
-            bytes += std::mem::size_of_val(block.data());
+    for source in 0..scene.blocks.len() {
+        let arrivals = match config.coupling {
+            Coupling::Table => table.follow(source),
+            Coupling::Lightfield => {
+                lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)
+            }
+        };
+        for (doors, block, joint) in project(scene, dictionary, used_shapes, arrivals) {
+            bytes += std::mem::size_of_val(joint.data());
             if bytes > max_bytes {
                 return Err(AssembleError::TooLarge {
                     expected: config.max_bytes,
                     found: config.max_bytes - max_bytes + bytes,
                 });
             }
-            blocks.push((row, source, block));
+            gated.entry(doors).or_default().push((block, source, joint));
         }
     }
-    Ok(BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks))
+    let row_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.joint.len()).collect();
+    let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
+    let steady = gated.remove(&Vec::new()).unwrap_or_default();
+    Ok(Transport {
+        steady: BlockSparse::from_blocks(&row_sizes, &column_sizes, steady),
+        gated: gated
+            .into_iter()
+            .map(|(doors, blocks)| Gate {
+                doors,
+                operator: BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks),
+            })
+            .collect(),
+    })
 }
 
-/// The sum of all light of `source` that enters each (block, face).
-fn follow(
+/// Projects responses on the joint bases, and sums those of one block behind the same doors.
+fn project(
     scene: &Scene,
     dictionary: &Dictionary,
-    source: &SceneBlock,
-    emission: &[Matrix<f32>],
-    max_depth: usize,
-) -> BTreeMap<(usize, Face), Matrix<f32>> {
-    let mut front: BTreeMap<WaveKey, Wave> = BTreeMap::new();
-    for (&face, lightfield) in source.shape.openings.iter().zip(emission) {
-        let sent = Wave {
-            source_from_here: CubeRotation::IDENTITY,
-            lightfield: lightfield.clone(),
+    used_shapes: &[usize],
+    arrivals: Arrivals,
+) -> Vec<(Vec<u32>, usize, Matrix<f32>)> {
+    let mut sums: Vec<(Vec<u32>, usize, Matrix<f32>)> = Vec::new();
+    for (key, responses) in arrivals {
+        let placed = &scene.blocks[key.block];
+        let entry = &dictionary.shapes[used_shapes[placed.shape_index]];
+        let opening = placed
+            .shape
+            .openings
+            .iter()
+            .position(|opening| opening.face == key.face);
+        let Some(operator) = opening.and_then(|k| {
+            entry.openings[k]
+                .joint_from_response
+                .get(usize::from(key.exchanged))
+        }) else {
+            // Assembly refuses rolled interfaces that the dictionary has no operators for.
+            continue;
         };
-        cross(&mut front, source, face, 0, sent);
-    }
-    let mut arrived: BTreeMap<(usize, Face), Matrix<f32>> = BTreeMap::new();
-    for depth in 1..=max_depth {
-        if front.is_empty() {
-            break;
-        }
-        let mut next = BTreeMap::new();
-        for ((block, face, headings, _), wave) in front {
-            let here = &scene.blocks[block];
-            for &exit in here.shape.openings.iter().filter(|&&exit| exit != face) {
-                let heading = wave.source_from_here.face(exit);
-                let turns_back = headings >> heading.opposite().index() & 1 == 1;
-                let leads_on = matches!(here.beyond[exit.index()], Beyond::Block { .. });
-                if depth == max_depth || turns_back || !leads_on {
-                    continue;
-                }
-                let through = match entering_frame(face).inverse().face(exit) {
-                    Face::PosZ => &dictionary.interface.straight,
-                    Face::PosX => &dictionary.interface.left,
-                    Face::NegX => &dictionary.interface.right,
-                    // Assembly refuses interfaces whose up directions differ, and no shape opens
-                    // upwards or downwards.
-                    _ => continue,
-                };
-                let sent = Wave {
-                    source_from_here: wave.source_from_here,
-                    lightfield: multiply(through.view(), wave.lightfield.view()),
-                };
-                cross(&mut next, here, exit, headings, sent);
+        match sums.last_mut() {
+            Some((doors, block, sum)) if *block == key.block && *doors == key.doors => {
+                multiply_add(operator.view(), responses.view(), sum.data_mut());
             }
-            add(&mut arrived, (block, face), wave.lightfield);
+            _ => {
+                let joint = multiply(operator.view(), responses.view());
+                sums.push((key.doors, key.block, joint));
+            }
         }
-        front = next;
     }
-    arrived
+    sums
 }
 
-/// Passes a wave through a face of `here` into the block beyond, if there is one.
-fn cross(
-    front: &mut BTreeMap<WaveKey, Wave>,
-    here: &SceneBlock,
-    face: Face,
-    headings: u8,
-    wave: Wave,
+/// Adds responses, brought to the frame without mirrors, to those that enter at the same place.
+fn arrive(
+    arrivals: &mut Arrivals,
+    doors: &[u32],
+    (block, face): (usize, Face),
+    target_frame: CubeSymmetry,
+    parity: &[u8],
+    responses: &Matrix<f32>,
 ) {
-    let Beyond::Block {
+    let roll = Roll::of(target_frame);
+    let key = ArrivalKey {
+        doors: doors.to_vec(),
         block,
-        face: entered,
-        here_from_there,
-    } = here.beyond[face.index()]
-    else {
-        return;
+        face,
+        exchanged: roll.exchanged,
     };
-    let heading = wave.source_from_here.face(face);
-    let turn = |direction: Face| wave.source_from_here.face(here_from_there.face(direction));
-    let Some(source_from_here) = CubeRotation::from_images(turn(Face::PosX), turn(Face::PosY))
-    else {
-        return;
-    };
-    let headings = headings | 1 << heading.index();
-    let key = (block, entered, headings, turn(Face::PosX));
-    match front.get_mut(&key) {
-        Some(there) => add_into(&mut there.lightfield, &wave.lightfield),
-        None => {
-            let there = Wave {
-                source_from_here,
-                lightfield: wave.lightfield,
-            };
-            front.insert(key, there);
+    let sum = arrivals
+        .entry(key)
+        .or_insert_with(|| Matrix::zeros(responses.rows(), responses.columns()));
+    let rows = responses.rows().max(1);
+    for (to, from) in sum
+        .data_mut()
+        .chunks_exact_mut(rows)
+        .zip(responses.data().chunks_exact(rows))
+    {
+        for ((to, &from), &parity) in to.iter_mut().zip(from).zip(parity) {
+            *to += roll.sign(parity) * from;
         }
     }
 }
 
-fn add(
-    sums: &mut BTreeMap<(usize, Face), Matrix<f32>>,
-    key: (usize, Face),
-    lightfield: Matrix<f32>,
-) {
-    match sums.get_mut(&key) {
-        Some(sum) => add_into(sum, &lightfield),
-        None => {
-            sums.insert(key, lightfield);
-        }
+/// Doors on the way, with one more if there is one.
+fn with_door(doors: &[u32], door: Option<u32>) -> Vec<u32> {
+    let mut doors = doors.to_vec();
+    if let Some(door) = door
+        && let Err(at) = doors.binary_search(&door)
+    {
+        doors.insert(at, door);
     }
+    doors
 }
 
-fn add_into(sum: &mut Matrix<f32>, term: &Matrix<f32>) {
-    for (s, &t) in sum.data_mut().iter_mut().zip(term.data()) {
-        *s += t;
-    }
+/// `first`, then `second`, both maps of directions.
+fn compose(second: CubeRotation, first: CubeRotation) -> CubeRotation {
+    let image = |face: Face| second.face(first.face(face));
+    CubeRotation::from_images(image(Face::PosX), image(Face::PosY)).unwrap_or(first)
 }

@@ -1,7 +1,7 @@
 //! What the frame reads: a level joined with a dictionary, packed and immutable.
 
 use crate::atlas::AtlasLayout;
-use crate::shape::Shape;
+use crate::shape::{Aperture, Shape};
 use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
@@ -27,12 +27,18 @@ pub struct Scene {
     pub texel_normals: Vec<Vec3>,
     /// Linear RGB albedo of all texels.
     pub texel_albedo: Vec<Vec3>,
-    /// `T_b->r`: row parts are interfaces, column parts blocks.
-    pub response_from_coefficients: BlockSparse<f32>,
+    /// Radiosity that texels emit of themselves, linear RGB, W/m².
+    pub texel_emission: Vec<Vec3>,
+    /// `T_b->r`: from the coefficients b of all blocks to the joint coefficients of all blocks.
+    pub transport: Transport,
     /// Number of coefficients b over all blocks.
     pub coefficient_count: usize,
-    /// Number of response coefficients r over all interfaces.
-    pub response_count: usize,
+    /// Number of joint coefficients over all blocks.
+    pub joint_count: usize,
+    /// Doors in the order of the level's, with the value that each has at first.
+    pub doors: Vec<f32>,
+    /// Probes along an edge of a block; 0 if the dictionary has none.
+    pub probes: usize,
     /// Where each wall's texels go in the lightmap.
     pub atlas: AtlasLayout,
 }
@@ -54,8 +60,10 @@ pub struct SceneBlock {
     pub texels: Range<usize>,
     /// Its part of the coefficients b.
     pub coefficients: Range<usize>,
-    /// Connected openings, through which light of other blocks comes in.
-    pub interfaces: Vec<Interface>,
+    /// Its part of the joint coefficients; the first of them take its own coefficients b.
+    pub joint: Range<usize>,
+    /// Index into [`Scene::doors`] of the door in each canonical face.
+    pub doors: [Option<u32>; 6],
     /// All openings as loops in the world, in the order of the shape's list.
     pub portals: Vec<Portal>,
     /// Axis-aligned bounds (smallest, largest), metres.
@@ -74,29 +82,60 @@ pub struct Portal {
 }
 
 impl Portal {
-    /// The outline of a canonical face of a warped cube.
-    pub(crate) fn new(warp: &Hexahedron, face: Face) -> Self {
-        let mut corners = warp.face_corners(face);
+    /// The outline of an opening of a warped cube.
+    pub(crate) fn new(warp: &Hexahedron, opening: &Aperture) -> Self {
+        let mut corners = opening.corners().map(|corner| warp.point(corner));
         let turn = |c: &[DVec3; 4]| (c[1] - c[0]).cross(c[3] - c[0]);
         let middle = corners.iter().copied().sum::<DVec3>() / 4.0;
         if turn(&corners).dot(middle - warp.center()) < 0.0 {
             corners.reverse();
         }
         Self {
-            face,
+            face: opening.face,
             corners,
             outward: turn(&corners),
         }
     }
 }
 
-/// A connected opening seen from inside.
+/// `T_b->r` of a scene, parted by the doors that light passes on its way.
 #[derive(Clone, Debug)]
-pub struct Interface {
-    /// Position of the opening in the shape's list.
-    pub opening: usize,
-    /// Its part of the response coefficients r.
-    pub responses: Range<usize>,
+pub struct Transport {
+    /// Through openings that nothing closes: row and column parts are blocks.
+    pub steady: BlockSparse<f32>,
+    /// Through doors.
+    pub gated: Vec<Gate>,
+}
+
+/// What passes exactly these doors.
+#[derive(Clone, Debug)]
+pub struct Gate {
+    /// Indices into [`Scene::doors`], ascending.
+    pub doors: Vec<u32>,
+    /// To be multiplied by the product of the doors' values.
+    pub operator: BlockSparse<f32>,
+}
+
+impl Transport {
+    /// Bytes of all operators.
+    pub fn bytes(&self) -> usize {
+        self.steady.bytes() + self.gated.iter().map(|g| g.operator.bytes()).sum::<usize>()
+    }
+
+    /// Joint coefficients of light from other blocks, three channels, from the coefficients b and the doors'
+    /// values.
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn multiply(&self, coefficients: &[f32], doors: &[f32], joint: &mut [f32]) {
+        self.steady.multiply(coefficients, 3, joint);
+        for gate in &self.gated {
+            let value: f32 = gate.doors.iter().map(|&door| doors[door as usize]).product();
+            if value > 0.0 {
+                gate.operator.multiply_add_scaled(coefficients, 3, value, joint);
+            }
+        }
+    }
 }
 
 /// What lies beyond a face of a block.
@@ -122,10 +161,12 @@ pub enum Beyond {
 pub struct SceneShape {
     /// `T_d->b`, modes x texels.
     pub coefficients_from_direct: Matrix<f32>,
-    /// `U_b`, texels x modes.
-    pub indirect_basis: Matrix<f32>,
-    /// `U_r` brought to each opening of the shape, texels x response modes.
-    pub response_bases: Vec<Matrix<f32>>,
+    /// Texels x joint modes: irradiance from joint coefficients.
+    pub joint_basis: Matrix<f32>,
+    /// 9 probes³ x joint modes: SH coefficients of probes.
+    pub probe_basis: Matrix<f32>,
+    /// 4 texels x joint modes: vector irradiance, or no rows.
+    pub vector_basis: Matrix<f32>,
 }
 
 impl Scene {
@@ -177,12 +218,15 @@ impl Scene {
             .shapes
             .iter()
             .flat_map(|shape| {
-                [&shape.coefficients_from_direct, &shape.indirect_basis]
-                    .into_iter()
-                    .chain(&shape.response_bases)
+                [
+                    &shape.coefficients_from_direct,
+                    &shape.joint_basis,
+                    &shape.probe_basis,
+                    &shape.vector_basis,
+                ]
             })
             .map(|matrix| std::mem::size_of_val(matrix.data()))
             .sum();
-        of_shapes + self.response_from_coefficients.bytes()
+        of_shapes + self.transport.bytes()
     }
 }

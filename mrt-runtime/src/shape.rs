@@ -1,48 +1,176 @@
-//! The canonical shapes (Loos et al. 2011, section 6.1): cubes with faces missing.
+//! The canonical shapes (Loos et al. 2011, section 6.1): cubes with faces missing, or with a hole in a face.
 //!
-//! A shape is data. Adding one means adding a line to [`SHAPES`]; everything else, tests included,
-//! sweeps over that list.
+//! A shape is data. Adding one means adding a line to [`SHAPES`] and its name to a set of [`SHAPE_SETS`];
+//! everything else, tests included, sweeps over those lists.
 
 use glam::DVec3;
 use mrt_core::cube::Face;
 
-/// A unit cube some of whose faces are openings.
-#[derive(Debug, PartialEq, Eq)]
+/// A unit cube some of whose faces are open, wholly or in part.
+#[derive(Debug, PartialEq)]
 pub struct Shape {
     /// Used in level files and on the command line.
     pub name: &'static str,
-    /// Missing faces, in the order of [`Face::ALL`].
-    pub openings: &'static [Face],
+    /// Where light passes; at most one a face, in the order of [`Face::ALL`].
+    pub openings: &'static [Aperture],
 }
 
-/// Every shape: the two-dimensional dictionary, all cubes with 0 to 4 side faces missing up to
-/// rotation, with twelve openings between them.
-pub static SHAPES: [Shape; 6] = [
-    Shape {
-        name: "closed",
-        openings: &[],
-    },
-    Shape {
-        name: "dead_end",
-        openings: &[Face::PosX],
-    },
-    Shape {
-        name: "straight",
-        openings: &[Face::NegX, Face::PosX],
-    },
-    Shape {
-        name: "corner",
-        openings: &[Face::PosX, Face::PosZ],
-    },
-    Shape {
-        name: "tee",
-        openings: &[Face::NegX, Face::PosX, Face::PosZ],
-    },
-    Shape {
-        name: "cross",
-        openings: &[Face::NegX, Face::PosX, Face::NegZ, Face::PosZ],
-    },
+/// An opening of a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aperture {
+    /// The face that it is in.
+    pub face: Face,
+    /// Its outline there.
+    pub outline: Outline,
+}
+
+/// What part of a face an opening takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// The whole face, which is missing.
+    Whole,
+    /// A hole in a wall.
+    Hole(Hole),
+}
+
+/// A rectangle in a wall, in the face's (u, v). Both faces that meet at it must see the same rectangle, so it is
+/// symmetric in u.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Hole {
+    /// 0.4 wide, from the floor to 0.7: reaches down to the face's lower edge.
+    Door,
+    /// 0.5 x 0.4, from 0.4 to 0.8 above the floor.
+    Window,
+}
+
+impl Hole {
+    /// All holes.
+    pub const ALL: [Hole; 2] = [Hole::Door, Hole::Window];
+
+    /// The ranges of u and v on a side face.
+    pub fn rectangle(self) -> [[f64; 2]; 2] {
+        match self {
+            Hole::Door => [[0.3, 0.7], [0.0, 0.7]],
+            Hole::Window => [[0.25, 0.75], [0.4, 0.8]],
+        }
+    }
+
+    /// The position in [`Hole::ALL`].
+    pub fn index(self) -> usize {
+        self as usize
+    }
+}
+
+impl std::fmt::Display for Outline {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Outline::Whole => "no wall",
+            Outline::Hole(Hole::Door) => "a door",
+            Outline::Hole(Hole::Window) => "a window",
+        })
+    }
+}
+
+impl Aperture {
+    /// Four corners in the unit cube.
+    pub fn corners(&self) -> [DVec3; 4] {
+        let [u, v] = match self.outline {
+            Outline::Whole => [[0.0, 1.0]; 2],
+            Outline::Hole(hole) => hole.rectangle(),
+        };
+        self.face.rectangle(u, v)
+    }
+}
+
+const fn whole(face: Face) -> Aperture {
+    Aperture {
+        face,
+        outline: Outline::Whole,
+    }
+}
+
+const fn hole(face: Face, hole: Hole) -> Aperture {
+    Aperture {
+        face,
+        outline: Outline::Hole(hole),
+    }
+}
+
+const NEG_X: Aperture = whole(Face::NegX);
+const POS_X: Aperture = whole(Face::PosX);
+const NEG_Y: Aperture = whole(Face::NegY);
+const POS_Y: Aperture = whole(Face::PosY);
+const NEG_Z: Aperture = whole(Face::NegZ);
+const POS_Z: Aperture = whole(Face::PosZ);
+const DOOR: Aperture = hole(Face::PosX, Hole::Door);
+const WINDOW: Aperture = hole(Face::PosX, Hole::Window);
+
+const fn shape(name: &'static str, openings: &'static [Aperture]) -> Shape {
+    Shape { name, openings }
+}
+
+/// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six are those with side faces
+/// missing), and rooms with a door or a window.
+pub static SHAPES: [Shape; 14] = [
+    shape("closed", &[]),
+    shape("dead_end", &[POS_X]),
+    shape("straight", &[NEG_X, POS_X]),
+    shape("corner", &[POS_X, POS_Z]),
+    shape("tee", &[NEG_X, POS_X, POS_Z]),
+    shape("cross", &[NEG_X, POS_X, NEG_Z, POS_Z]),
+    shape("corner_up", &[POS_X, POS_Y, POS_Z]),
+    shape("tee_up", &[NEG_X, POS_X, POS_Y, POS_Z]),
+    shape("floor", &[NEG_X, POS_X, POS_Y, NEG_Z, POS_Z]),
+    shape("open", &[NEG_X, POS_X, NEG_Y, POS_Y, NEG_Z, POS_Z]),
+    shape("door", &[DOOR]),
+    shape("window", &[WINDOW]),
+    shape("doorway", &[NEG_X, DOOR]),
+    shape("window_end", &[NEG_X, WINDOW]),
 ];
+
+/// Shapes that are baked together, by name.
+pub static SHAPE_SETS: [(&str, &[&str]); 3] = [
+    (
+        "cubes-2d",
+        &["closed", "dead_end", "straight", "corner", "tee", "cross"],
+    ),
+    (
+        "cubes-3d",
+        &[
+            "closed",
+            "dead_end",
+            "straight",
+            "corner",
+            "tee",
+            "cross",
+            "corner_up",
+            "tee_up",
+            "floor",
+            "open",
+        ],
+    ),
+    (
+        "rooms",
+        &[
+            "closed",
+            "dead_end",
+            "straight",
+            "corner",
+            "tee",
+            "cross",
+            "door",
+            "window",
+            "doorway",
+            "window_end",
+        ],
+    ),
+];
+
+/// The shapes of a set of [`SHAPE_SETS`].
+pub fn shape_set(name: &str) -> Option<Vec<&'static Shape>> {
+    let (_, names) = SHAPE_SETS.iter().find(|(set, _)| *set == name)?;
+    names.iter().map(|name| Shape::from_name(name)).collect()
+}
 
 impl Shape {
     /// The shape of that name.
@@ -50,22 +178,33 @@ impl Shape {
         SHAPES.iter().find(|shape| shape.name == name)
     }
 
-    /// True when the face is missing.
+    /// True when the whole face is missing.
     pub fn is_open(&self, face: Face) -> bool {
-        self.openings.contains(&face)
+        self.opening(face)
+            .is_some_and(|opening| opening.outline == Outline::Whole)
     }
 
-    /// Faces that are there, in the order of [`Face::ALL`]; they carry the texels.
+    /// The opening in a face.
+    pub fn opening(&self, face: Face) -> Option<&Aperture> {
+        self.openings.iter().find(|opening| opening.face == face)
+    }
+
+    /// Faces that are there, at least in part, in the order of [`Face::ALL`]; they carry the texels.
     pub fn walls(&self) -> impl Iterator<Item = Face> + '_ {
         Face::ALL.into_iter().filter(|&face| !self.is_open(face))
     }
 
-    /// Number of texels at `resolution`² a wall.
-    pub fn texel_count(&self, resolution: usize) -> usize {
-        (6 - self.openings.len()) * resolution * resolution
+    /// Number of walls.
+    pub fn wall_count(&self) -> usize {
+        self.walls().count()
     }
 
-    /// Index of a wall's first texel, or `None` for an opening.
+    /// Number of texels at `resolution`² a wall, those in the hole of a wall included: they stay dark.
+    pub fn texel_count(&self, resolution: usize) -> usize {
+        self.wall_count() * resolution * resolution
+    }
+
+    /// Index of a wall's first texel, or `None` for a missing face.
     pub fn wall_offset(&self, face: Face, resolution: usize) -> Option<usize> {
         let position = self.walls().position(|wall| wall == face)?;
         Some(position * resolution * resolution)
@@ -79,6 +218,16 @@ impl Shape {
                 (0..resolution).map(move |i| (face, face.texel_center(resolution, j, i)))
             })
         })
+    }
+
+    /// True when a texel's centre is in the hole of its wall.
+    pub fn is_in_hole(&self, face: Face, center: DVec3) -> bool {
+        let Some(Outline::Hole(hole)) = self.opening(face).map(|opening| opening.outline) else {
+            return false;
+        };
+        let [u, v] = hole.rectangle();
+        let within = |range: [f64; 2], x: f64| range[0] < x && x < range[1];
+        within(u, center[face.u_axis()]) && within(v, center[face.v_axis()])
     }
 
     /// The index in [`SHAPES`].
@@ -95,30 +244,70 @@ mod tests {
     use super::*;
     use mrt_core::cube::CubeRotation;
 
+    /// How many shapes of a set have exactly the wanted faces missing in some rotation.
+    fn matches(
+        set: &str,
+        wanted: &[Face],
+        rotations: impl Iterator<Item = CubeRotation> + Clone,
+    ) -> usize {
+        shape_set(set)
+            .expect("a set")
+            .iter()
+            .filter(|shape| {
+                rotations.clone().any(|rotation| {
+                    shape.openings.len() == wanted.len()
+                        && shape
+                            .openings
+                            .iter()
+                            .all(|opening| wanted.contains(&rotation.face(opening.face)))
+                })
+            })
+            .count()
+    }
+
+    fn subset(faces: &[Face], mask: u32) -> Vec<Face> {
+        (0..faces.len())
+            .filter(|bit| mask >> bit & 1 == 1)
+            .map(|bit| faces[bit])
+            .collect()
+    }
+
     #[test]
-    fn side_openings_are_covered_once_up_to_rotation() {
+    fn side_openings_are_covered_once_up_to_turns_about_y() {
         let sides = [Face::NegX, Face::PosX, Face::NegZ, Face::PosZ];
         for mask in 0..16u32 {
-            let wanted: Vec<Face> = (0..4)
-                .filter(|bit| mask >> bit & 1 == 1)
-                .map(|bit| sides[bit])
-                .collect();
-            let matches = SHAPES
-                .iter()
-                .filter(|shape| {
-                    (0..4).any(|turns| {
-                        let rotation = CubeRotation::about_y(turns);
-                        shape.openings.len() == wanted.len()
-                            && shape
-                                .openings
-                                .iter()
-                                .all(|&face| wanted.contains(&rotation.face(face)))
-                    })
-                })
-                .count();
-            assert_eq!(matches, 1, "openings {wanted:?}");
+            let wanted = subset(&sides, mask);
+            let turns = (0..4).map(CubeRotation::about_y);
+            assert_eq!(matches("cubes-2d", &wanted, turns), 1, "{wanted:?}");
         }
-        assert_eq!(SHAPES.iter().map(|s| s.openings.len()).sum::<usize>(), 12);
+        let openings = |set: &str| -> usize {
+            let shapes = shape_set(set).expect("a set");
+            shapes.iter().map(|s| s.openings.len()).sum()
+        };
+        assert_eq!(openings("cubes-2d"), 12);
+        assert_eq!(openings("cubes-3d"), 30);
+    }
+
+    #[test]
+    fn all_openings_are_covered_once_up_to_rotation() {
+        for mask in 0..64u32 {
+            let wanted = subset(&Face::ALL, mask);
+            let rotations: Vec<_> = CubeRotation::all().collect();
+            let rotations = rotations.iter().copied();
+            assert_eq!(matches("cubes-3d", &wanted, rotations), 1, "{wanted:?}");
+        }
+    }
+
+    #[test]
+    fn every_shape_is_in_a_set_and_has_its_own_name() {
+        for (index, shape) in SHAPES.iter().enumerate() {
+            assert_eq!(shape.index(), index, "{}", shape.name);
+            assert!(SHAPE_SETS.iter().any(|(_, set)| set.contains(&shape.name)));
+            assert!(shape.openings.is_sorted_by_key(|opening| opening.face));
+        }
+        for (name, _) in SHAPE_SETS {
+            assert!(shape_set(name).is_some(), "{name}");
+        }
     }
 
     #[test]
@@ -132,6 +321,16 @@ mod tests {
                     None => assert!(shape.is_open(face)),
                 }
             }
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_hole_see_the_same_rectangle() {
+        for hole in Hole::ALL {
+            let [u, v] = hole.rectangle();
+            // Two decimals that add up to one.
+            assert!((u[0] + u[1] - 1.0).abs() < 1e-15);
+            assert!(0.0 <= v[0] && v[1] <= 1.0);
         }
     }
 }

@@ -28,8 +28,9 @@ pub enum Toward {
 
 /// Decides what part of a light reaches a point.
 pub trait Visibility {
-    /// Fraction in [0, 1] of the light that arrives; what is more counts as 1, NaN as 0.
-    fn fraction(&self, scene: &Scene, receiver: Receiver, toward: Toward) -> f32;
+    /// Fraction in [0, 1] of the light that arrives, with the value of each of [`Scene::doors`]; what is more
+    /// counts as 1, NaN as 0.
+    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32;
 }
 
 /// Light goes where the level's openings let it.
@@ -37,12 +38,8 @@ pub trait Visibility {
 pub struct Openings;
 
 impl Visibility for Openings {
-    fn fraction(&self, scene: &Scene, receiver: Receiver, toward: Toward) -> f32 {
-        if passes_openings(scene, receiver, toward) {
-            1.0
-        } else {
-            0.0
-        }
+    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
+        through_openings(scene, doors, receiver, toward)
     }
 }
 
@@ -58,7 +55,7 @@ pub struct Rays<F>(pub F);
 pub const RAY_REACH: f64 = 1e6;
 
 impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
-    fn fraction(&self, _: &Scene, receiver: Receiver, toward: Toward) -> f32 {
+    fn fraction(&self, _: &Scene, _: &[f32], receiver: Receiver, toward: Toward) -> f32 {
         let target = match toward {
             Toward::Point { position, .. } => position,
             Toward::Infinity(direction) => receiver.position + direction * RAY_REACH,
@@ -68,37 +65,41 @@ impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
 }
 
 /// Follows the segment from the receiver through connected openings until it is in the light's
-/// block, or outside for lights at infinity.
+/// block, or outside for lights at infinity; the product of the doors' values on the way.
 ///
 /// Inside a block nothing is in the way: blocks count as convex, as they are unless faces are bent. A line
 /// that leaves through an opening to the outside reaches lights at infinity, even if other blocks of the
 /// level stand further on.
-fn passes_openings(scene: &Scene, receiver: Receiver, toward: Toward) -> bool {
+fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
     let (direction, goal) = match toward {
         Toward::Point { position, block } => (position - receiver.position, Some(block)),
         Toward::Infinity(direction) => (direction, None),
     };
     let mut here = receiver.block;
     let mut entered = None;
+    let mut passed = 1.0;
     // A straight line enters each convex block at most once.
     for _ in 0..scene.blocks.len() {
         if Some(here) == goal {
-            return true;
+            return passed;
         }
         let block = &scene.blocks[here];
         let exit = block.portals.iter().find(|portal| {
             Some(portal.face) != entered && leaves_through(portal, receiver.position, direction)
         });
+        if let Some(door) = exit.and_then(|portal| block.doors[portal.face.index()]) {
+            passed *= doors[door as usize];
+        }
         match exit.map(|portal| block.beyond[portal.face.index()]) {
             Some(Beyond::Block { block, face, .. }) => {
                 here = block;
                 entered = Some(face);
             }
-            Some(Beyond::Outside) => return goal.is_none(),
-            Some(Beyond::Wall) | None => return false,
+            Some(Beyond::Outside) if goal.is_none() => return passed,
+            _ => return 0.0,
         }
     }
-    false
+    0.0
 }
 
 /// True when the line from `origin` along `direction` passes the portal outwards.

@@ -68,6 +68,20 @@ impl<'a> Container<'a> {
         self.version
     }
 
+    /// True if there is a section of that name.
+    pub fn has(&self, name: &str) -> bool {
+        self.sections().any(|(section, _)| section == name)
+    }
+
+    /// Number of elements of a section.
+    ///
+    /// # Errors
+    /// [`ContainerError`], if there is no such section.
+    pub fn element_count(&self, name: &str) -> Result<usize, ContainerError> {
+        let section = self.section(name)?;
+        Ok(section.bytes.len() / section.element_type.size())
+    }
+
     /// Names and types of all sections, in the order of the file.
     pub fn sections(&self) -> impl Iterator<Item = (&'a str, ElementType)> + '_ {
         self.sections.iter().map(|s| (s.name, s.element_type))
