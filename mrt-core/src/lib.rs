@@ -12,6 +12,7 @@ pub mod bvh;
 pub mod container;
 pub mod cube;
 pub mod form_factor;
+pub mod polygon_moments;
 pub mod hexahedron;
 pub mod matrix;
 pub mod mesh;
