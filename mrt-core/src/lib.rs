@@ -20,5 +20,6 @@ pub mod parity;
 pub mod radiometry;
 pub mod sampling;
 pub mod sh;
+pub mod ohlsh;
 #[cfg(feature = "svd")]
 pub mod svd;
