@@ -14,9 +14,9 @@
 //! first four functions of [`sh`]: 1, y, z, x. They have the unit of irradiance.
 //!
 //! Errors in percent inside a cube, as measured by the test at the foot: relative L2 over the normals
-//! within 60 degrees, mean and worst over 36 points of a wall and five lightings of a kind. The rest of
-//! the walls emit: one alone, all with brightness from 1 to 100 (with or without gradients), or
-//! one with a quarter of its brightness on the others.
+//! within 60 degrees, mean and worst over 36 points of a wall and five lightings of a kind. The other
+//! walls emit: one alone, all with brightness from 1 to 100 and gradients, or one with a
+//! quarter of its brightness on the others. The last column has a fourth kind too, 1 to 100 without gradients.
 //!
 //! | coefficients | one wall | 1 to 100 | one and 1/4 | all |
 //! | --- | --- | --- | --- | --- |
@@ -26,8 +26,8 @@
 //! | nearest linear function | 7.2, 14.0 | 4.2, 10.6 | 2.7, 3.8 | 4.5, 14.0 |
 //! | nine of irradiance | 2.1, 3.8 | 1.1, 2.8 | 0.8, 1.0 | 1.2, 3.8 |
 //!
-//! So no four linear coefficients stay within 3 % where one wall outshines the others; what is left is
-//! the curvature across the normal, xy and x² - y².
+//! So no four linear coefficients stay within 3 % where one wall outshines the others. About half of
+//! what is left is curvature in xy and x² - y².
 
 use crate::polygon_moments::Moments;
 use crate::sh;

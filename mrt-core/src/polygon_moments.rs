@@ -13,10 +13,9 @@
 //!
 //! The solid angle is from A. van Oosterom and J. Strackee, "The Solid Angle of a Plane Triangle",
 //! IEEE Trans. Biomed. Eng. 1983. The sums cancel for small polygons: terms as large as the
-//! polygon's angular size leave a result as large as its square. Below [`SMALL`] a quadrature
+//! polygon's angular size leave a result as large as its square. Below `SMALL` a quadrature
 //! takes over, which has no such loss.
 
-use crate::sh;
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -71,7 +70,7 @@ impl Moments {
         }
     }
 
-    /// ∫ Y dω of the nine functions of [`sh`] with l <= 2: the coefficients of radiance 1 that comes
+    /// ∫ Y dω of the nine functions of [`crate::sh`] with l <= 2: the coefficients of radiance 1 that comes
     /// from the polygon.
     pub fn sh9(&self) -> [f64; 9] {
         let [xx, yy, zz, xy, yz, zx] = self.second;
@@ -270,6 +269,7 @@ mod tests {
     use super::*;
     use crate::cube::Face;
     use crate::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
+    use crate::sh;
 
     /// Fixed numbers in [0, 1): a linear congruence, its upper bits.
     struct Numbers(u64);
