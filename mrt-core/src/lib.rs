@@ -13,6 +13,7 @@ pub mod container;
 pub mod cube;
 pub mod cube_symmetry;
 pub mod form_factor;
+pub mod polygon_moments;
 pub mod hexahedron;
 pub mod matrix;
 pub mod mesh;
@@ -20,5 +21,6 @@ pub mod parity;
 pub mod radiometry;
 pub mod sampling;
 pub mod sh;
+pub mod ohlsh;
 #[cfg(feature = "svd")]
 pub mod svd;
