@@ -128,6 +128,29 @@ impl<T: Scalar> BlockSparse<T> {
             multiply_add(block, part, &mut y[to..to + block.rows() * channels]);
         }
     }
+
+    /// `y += factor * self * x`, as [`BlockSparse::multiply`].
+    ///
+    /// # Panics
+    /// If a slice has the wrong length.
+    pub fn multiply_add_scaled(&self, x: &[T], channels: usize, factor: T, y: &mut [T]) {
+        assert_eq!(x.len(), self.columns() * channels, "input length");
+        assert_eq!(y.len(), self.rows() * channels, "output length");
+        for (row, column, block) in self.blocks() {
+            let from = self.column_offsets[column] * channels;
+            let to = self.row_offsets[row] * channels;
+            for channel in 0..channels {
+                let part = &x[from + channel * block.columns()..][..block.columns()];
+                let out = &mut y[to + channel * block.rows()..][..block.rows()];
+                for (k, &weight) in part.iter().enumerate() {
+                    let weight = factor * weight;
+                    for (y, &a) in out.iter_mut().zip(block.column(k)) {
+                        *y += a * weight;
+                    }
+                }
+            }
+        }
+    }
 }
 
 fn offsets(sizes: &[usize]) -> Vec<usize> {

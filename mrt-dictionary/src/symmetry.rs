@@ -1,82 +1,80 @@
-//! The mirrors that leave a canonical shape as it is, acting on its texels.
+//! The mirrors that leave a canonical shape as it is, acting on its texels and probes.
 
-use glam::DVec3;
+use crate::outputs::{DIRECTIONS, probe_points};
+use glam::{DVec3, IVec3};
 use mrt_core::cube::Face;
+use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::parity::ParityClasses;
-use mrt_runtime::shape::Shape;
+use mrt_runtime::shape::{Outline, Shape};
 use std::collections::HashMap;
 
-/// A reflection of the unit cube: a signed exchange of axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Mirror {
-    /// Reverses one axis.
-    Axis(usize),
-    /// Exchanges x and z.
-    Diagonal,
+/// True if the map takes every opening to one of the same outline; holes know up, so it must keep y there.
+fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
+    shape.openings.iter().all(|opening| {
+        let same = shape
+            .opening(map.face(opening.face))
+            .is_some_and(|image| image.outline == opening.outline);
+        let keeps_up = map.face(Face::PosY) == Face::PosY;
+        same && (keeps_up || opening.outline == Outline::Whole)
+    })
 }
 
-impl Mirror {
-    fn point(self, mut point: DVec3) -> DVec3 {
-        match self {
-            Mirror::Axis(axis) => point[axis] = 1.0 - point[axis],
-            Mirror::Diagonal => point = DVec3::new(point.z, point.y, point.x),
-        }
-        point
-    }
-
-    fn face(self, face: Face) -> Face {
-        match self {
-            Mirror::Axis(axis) if face.axis() == axis => face.opposite(),
-            Mirror::Axis(_) => face,
-            Mirror::Diagonal => Face::from_axis(2 - face.axis(), face.is_positive()),
-        }
-    }
-
-    fn keeps(self, shape: &Shape) -> bool {
-        shape
-            .openings
-            .iter()
-            .all(|&face| shape.is_open(self.face(face)))
-    }
-}
-
-/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, or the
-/// diagonal one where only that of y does (the exchange of x and z commutes with it).
-fn mirrors(shape: &Shape) -> Vec<Mirror> {
-    let axes: Vec<Mirror> = (0..3)
-        .map(Mirror::Axis)
-        .filter(|mirror| mirror.keeps(shape))
+/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of
+/// two axes neither of which has one.
+fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
+    let axes: Vec<usize> = (0..3)
+        .filter(|&axis| keeps(CubeSymmetry::mirror(axis), shape))
         .collect();
-    let has_x_or_z = axes.contains(&Mirror::Axis(0)) || axes.contains(&Mirror::Axis(2));
-    if !has_x_or_z && Mirror::Diagonal.keeps(shape) {
-        return axes.into_iter().chain([Mirror::Diagonal]).collect();
-    }
-    axes
+    let exchange = [(0, 2), (0, 1), (1, 2)]
+        .into_iter()
+        .filter(|(a, b)| !axes.contains(a) && !axes.contains(b))
+        .map(|(a, b)| CubeSymmetry::exchange(a, b))
+        .find(|&map| keeps(map, shape));
+    axes.into_iter()
+        .map(CubeSymmetry::mirror)
+        .chain(exchange)
+        .collect()
 }
 
-/// Parity classes of the shape's texels: eight for cube, straight and cross, four for the others.
+/// Parity classes of the shape's texels: eight for cube, straight and cross, four for most others.
 pub fn texel_parity_classes(shape: &Shape, resolution: usize) -> ParityClasses {
+    output_parity_classes(shape, resolution, 0)
+}
+
+/// Parity classes of the shape's texels followed by the samples of its probes: for each of `probes`³ probes
+/// the values in [`DIRECTIONS`].
+pub fn output_parity_classes(shape: &Shape, resolution: usize, probes: usize) -> ParityClasses {
+    // Texel and probe centres are odd multiples of half a step: exact as integers.
+    let texel = |face: Face, p: DVec3| (Some(face), scaled(p, resolution), IVec3::ZERO);
+    let probe = |p: DVec3, direction: IVec3| (None, scaled(p, probes), direction);
     let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
-    // Texel centres are odd multiples of half a texel: exact as integers.
-    let key = |face: Face, p: DVec3| {
-        let scaled = p * (2 * resolution) as f64;
-        (face, scaled.round().as_ivec3().to_array())
-    };
+    let samples: Vec<(DVec3, IVec3)> = probe_points(probes)
+        .flat_map(|p| DIRECTIONS.iter().map(move |&d| (p, d)))
+        .collect();
     let index: HashMap<_, u32> = texels
         .iter()
-        .enumerate()
-        .map(|(k, &(face, p))| (key(face, p), k as u32))
+        .map(|&(face, p)| texel(face, p))
+        .chain(samples.iter().map(|&(p, d)| probe(p, d)))
+        .zip(0..)
         .collect();
     let permutations: Vec<Vec<u32>> = mirrors(shape)
         .into_iter()
-        .map(|mirror| {
-            texels
+        .map(|map| {
+            let texels = texels
                 .iter()
-                .map(|&(face, p)| index[&key(mirror.face(face), mirror.point(p))])
-                .collect()
+                .map(|&(face, p)| texel(map.face(face), map.point(p)));
+            let samples = samples.iter().map(|&(p, d)| {
+                let d = map.direction(d.as_dvec3()).as_ivec3();
+                probe(map.point(p), d)
+            });
+            texels.chain(samples).map(|key| index[&key]).collect()
         })
         .collect();
-    ParityClasses::new(texels.len(), &permutations)
+    ParityClasses::new(texels.len() + samples.len(), &permutations)
+}
+
+fn scaled(point: DVec3, steps: usize) -> IVec3 {
+    (point * (2 * steps) as f64).round().as_ivec3()
 }
 
 #[cfg(test)]
@@ -86,10 +84,35 @@ mod tests {
 
     #[test]
     fn fold_factors_are_those_of_the_shapes() {
-        let factors: Vec<usize> = SHAPES
+        let factors: Vec<(&str, usize)> = SHAPES
             .iter()
-            .map(|shape| texel_parity_classes(shape, 4).class_count())
+            .filter(|shape| shape.wall_count() > 0)
+            .map(|shape| (shape.name, texel_parity_classes(shape, 4).class_count()))
             .collect();
-        assert_eq!(factors, [8, 4, 8, 4, 4, 8]);
+        let expected = [
+            ("closed", 8),
+            ("dead_end", 4),
+            ("straight", 8),
+            ("corner", 4),
+            ("tee", 4),
+            ("cross", 8),
+            ("corner_up", 2),
+            ("tee_up", 4),
+            ("floor", 4),
+            ("door", 2),
+            ("window", 2),
+            ("doorway", 2),
+            ("window_end", 2),
+        ];
+        assert_eq!(factors, expected);
+    }
+
+    #[test]
+    fn probes_follow_the_mirrors() {
+        for shape in &SHAPES {
+            let texels = shape.texel_count(4);
+            let classes = output_parity_classes(shape, 4, 2);
+            assert_eq!(classes.point_count(), texels + 8 * DIRECTIONS.len());
+        }
     }
 }

@@ -59,9 +59,7 @@ pub struct ShapeOperators {
 /// exchanged; sets without vertical openings need one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpeningOperators {
-    /// `R_b->rlf`, lightfield modes x modes: the lightfield that leaves.
-    pub lightfield_from_coefficients: Matrix<f32>,
-    /// Emission modes x modes: what a path's operator takes.
+    /// Emission modes x modes: what leaves.
     pub emission_from_coefficients: Vec<Matrix<f32>>,
     /// Joint modes x response modes: what light that enters becomes.
     pub joint_from_response: Vec<Matrix<f32>>,
@@ -72,6 +70,9 @@ pub struct OpeningOperators {
 pub struct LightfieldOperators {
     /// Parity of each mode: bit 0 set if odd in x, bit 1 if odd in y.
     pub parity: Vec<u8>,
+    /// Lightfield modes x emission modes: the lightfield of what leaves a shape. With
+    /// [`OpeningOperators::emission_from_coefficients`] it makes the paper's `R_b->rlf`.
+    pub from_emission: Matrix<f32>,
     /// At the opening straight ahead from the one entered: modes x modes.
     pub straight: Matrix<f32>,
     /// At the opening on the left (towards +x); the one on the right follows by the mirror.
@@ -145,6 +146,7 @@ impl Dictionary {
     pub fn bytes(&self) -> usize {
         let fields = &self.lightfields;
         let shared: usize = [
+            &fields.from_emission,
             &fields.straight,
             &fields.left,
             &fields.exchange,
@@ -187,8 +189,9 @@ impl ShapeOperators {
     /// Bytes of this shape's matrices.
     pub fn bytes(&self) -> usize {
         let of_openings = self.openings.iter().flat_map(|opening| {
-            std::iter::once(&opening.lightfield_from_coefficients)
-                .chain(&opening.emission_from_coefficients)
+            opening
+                .emission_from_coefficients
+                .iter()
                 .chain(&opening.joint_from_response)
         });
         [

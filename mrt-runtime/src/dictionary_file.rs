@@ -1,10 +1,10 @@
 //! Dictionaries as bytes, in the versioned container of the core.
 //!
 //! Sections: `preset` and `settings` (text), `sizes` (resolution, probes, shapes, lightfield modes, emission
-//! modes, response modes, 1 with vertical openings, holes), `dropped`; of lightfields `rlf.par`, `left`,
-//! `straight`, `exchange`, `hole<n>`, `T_rlf_r`; of the path table `words` (text), `e.par`, `r.par` and one
+//! modes, response modes, 1 with vertical openings, holes), `dropped`; of lightfields `rlf.par`, `e_rlf`,
+//! `left`, `straight`, `exchange`, `hole<n>`, `T_rlf_r`; of the path table `words` (text), `e.par`, `r.par` and one
 //! `P<n>` a word; of shape number n `n.name` (text), `n.sigma`, `n.T_d_b`, `n.J`, `n.J_prb`, `n.J_vec`,
-//! `n.L_imp`, `n.drop`, and for its opening m `n.Rm`, `n.Em`, `n.Qm` and with vertical openings `n.Xm`, `n.Ym`
+//! `n.L_imp`, `n.drop`, and for its opening m `n.Em`, `n.Qm` and with vertical openings `n.Xm`, `n.Ym`
 //! (the same as `E` and `Q` with x and y exchanged). Last, unless the dictionary is packed, `B_e` and `U_r`.
 //! Matrices are column-major `f32`.
 
@@ -129,6 +129,7 @@ impl Dictionary {
         writer.add_numbers("dropped", &dropped)?;
         writer.add_numbers("rlf.par", &as_u16(&fields.parity))?;
         for (name, matrix) in [
+            ("e_rlf", &fields.from_emission),
             ("left", &fields.left),
             ("straight", &fields.straight),
             ("exchange", &fields.exchange),
@@ -161,8 +162,6 @@ impl Dictionary {
             let dropped = [entry.dropped_energy, entry.joint_dropped_energy];
             writer.add_numbers(&format!("{index}.drop"), &dropped)?;
             for (m, opening) in entry.openings.iter().enumerate() {
-                let lightfield = &opening.lightfield_from_coefficients;
-                writer.add_numbers(&format!("{index}.R{m}"), lightfield.data())?;
                 for (letter, matrix) in ["E", "X"]
                     .iter()
                     .zip(&opening.emission_from_coefficients)
@@ -194,6 +193,7 @@ impl Dictionary {
         let fields = sizes.lightfield_modes;
         let lightfields = LightfieldOperators {
             parity: source.parities("rlf.par", fields)?,
+            from_emission: source.matrix("e_rlf", fields, sizes.emission_modes)?,
             straight: source.matrix("straight", fields, fields)?,
             left: source.matrix("left", fields, fields)?,
             exchange: source.matrix("exchange", if sizes.vertical { fields } else { 0 }, fields)?,
@@ -445,9 +445,7 @@ fn read_shape(
     let vertical = usize::from(sizes.vertical);
     let openings = (0..shape.openings.len())
         .map(|m| {
-            let lightfield = source.matrix(&section(&format!("R{m}")), sizes.lightfield_modes, modes)?;
             let mut operators = OpeningOperators {
-                lightfield_from_coefficients: lightfield,
                 emission_from_coefficients: Vec::new(),
                 joint_from_response: Vec::new(),
             };

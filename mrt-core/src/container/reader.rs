@@ -79,7 +79,7 @@ impl<'a> Container<'a> {
     /// [`ContainerError`], if there is no such section.
     pub fn element_count(&self, name: &str) -> Result<usize, ContainerError> {
         let section = self.section(name)?;
-        Ok(section.bytes.len() / section.element_type.size())
+        Ok(section.content.len() / section.element_type.size())
     }
 
     /// Names and types of all sections, in the order of the file.

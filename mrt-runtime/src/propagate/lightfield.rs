@@ -57,7 +57,10 @@ pub(super) fn follow(
             frame: frame_of_heading(aperture.face),
             headings: 0,
             doors: &[],
-            lightfield: operators.lightfield_from_coefficients.clone(),
+            lightfield: multiply(
+                fields.from_emission.view(),
+                operators.emission_from_coefficients[0].view(),
+            ),
         };
         cross(&mut front, scene, fields, sent);
     }

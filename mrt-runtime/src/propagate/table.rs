@@ -28,8 +28,6 @@ pub(super) struct Table<'a> {
 struct Path {
     word: Word,
     block: usize,
-    /// The canonical face of that block.
-    entered: Face,
     /// Takes the entered block's canonical directions to the source's.
     source_from_here: CubeRotation,
     /// Headings of the word's x and y in the source's frame, as far as they are used.
@@ -62,7 +60,6 @@ impl<'a> Table<'a> {
             let start = Path {
                 word: Word::default(),
                 block: source,
-                entered: aperture.face,
                 source_from_here: CubeRotation::IDENTITY,
                 x: None,
                 y: None,
@@ -114,7 +111,6 @@ impl<'a> Table<'a> {
         let next = Path {
             word,
             block,
-            entered,
             source_from_here: compose(path.source_from_here, here_from_there),
             x,
             y,
