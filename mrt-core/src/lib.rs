@@ -19,5 +19,6 @@ pub mod parity;
 pub mod radiometry;
 pub mod sampling;
 pub mod sh;
+pub mod storage;
 #[cfg(feature = "svd")]
 pub mod svd;
