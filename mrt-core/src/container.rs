@@ -13,6 +13,7 @@
 mod element;
 mod error;
 mod file;
+mod in_place;
 mod reader;
 mod writer;
 

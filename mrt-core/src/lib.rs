@@ -22,5 +22,6 @@ pub mod radiometry;
 pub mod sampling;
 pub mod sh;
 pub mod ohlsh;
+pub mod storage;
 #[cfg(feature = "svd")]
 pub mod svd;

@@ -76,7 +76,7 @@ impl Default for ProbeSamples {
 
 fn sh_value(direction: DVec3, index: usize) -> f64 {
     let mut values = [0.0; SH9];
-    sh::evaluate(3, direction, &mut values);
+    sh::evaluate(direction, &mut values);
     values[index]
 }
 

@@ -1,5 +1,8 @@
 //! The types of number that sections hold.
 
+use bytemuck::AnyBitPattern;
+use half::f16;
+
 /// Type of a section's elements; the discriminant is the code in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ElementType {
@@ -7,7 +10,7 @@ pub enum ElementType {
     Bytes = 0,
     /// UTF-8.
     Text = 1,
-    /// 16-bit unsigned integers, or the bits of half-precision numbers.
+    /// 16-bit unsigned integers.
     U16 = 2,
     /// 32-bit unsigned integers.
     U32 = 3,
@@ -17,10 +20,14 @@ pub enum ElementType {
     F32 = 5,
     /// IEEE double precision.
     F64 = 6,
+    /// 8-bit signed integers.
+    I8 = 7,
+    /// IEEE half precision.
+    F16 = 8,
 }
 
 impl ElementType {
-    pub(super) const ALL: [ElementType; 7] = [
+    pub(super) const ALL: [ElementType; 9] = [
         ElementType::Bytes,
         ElementType::Text,
         ElementType::U16,
@@ -28,21 +35,23 @@ impl ElementType {
         ElementType::U64,
         ElementType::F32,
         ElementType::F64,
+        ElementType::I8,
+        ElementType::F16,
     ];
 
     /// Bytes an element.
     pub const fn size(self) -> usize {
         match self {
-            ElementType::Bytes | ElementType::Text => 1,
-            ElementType::U16 => 2,
+            ElementType::Bytes | ElementType::Text | ElementType::I8 => 1,
+            ElementType::U16 | ElementType::F16 => 2,
             ElementType::U32 | ElementType::F32 => 4,
             ElementType::U64 | ElementType::F64 => 8,
         }
     }
 }
 
-/// A number that sections hold: `u16`, `u32`, `u64`, `f32` or `f64`.
-pub trait Element: Copy {
+/// A number that sections hold: `i8`, `u16`, `u32`, `u64`, `f16`, `f32` or `f64`.
+pub trait Element: AnyBitPattern {
     /// Its code in the table.
     const TYPE: ElementType;
     /// Appends its bytes.
@@ -64,8 +73,10 @@ macro_rules! element {
         }
     };
 }
+element!(i8, I8);
 element!(u16, U16);
 element!(u32, U32);
 element!(u64, U64);
+element!(f16, F16);
 element!(f32, F32);
 element!(f64, F64);

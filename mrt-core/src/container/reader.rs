@@ -10,11 +10,11 @@ pub struct Container<'a> {
 }
 
 #[derive(Clone, Debug)]
-struct Section<'a> {
+pub(super) struct Section<'a> {
     name: &'a str,
     element_type: ElementType,
-    offset: usize,
-    content: &'a [u8],
+    pub(super) offset: usize,
+    pub(super) content: &'a [u8],
 }
 
 impl<'a> Container<'a> {
@@ -87,6 +87,14 @@ impl<'a> Container<'a> {
         self.sections.iter().map(|s| (s.name, s.element_type))
     }
 
+    /// The type of a section's elements.
+    ///
+    /// # Errors
+    /// [`ContainerError::MissingSection`].
+    pub fn element_type(&self, name: &str) -> Result<ElementType, ContainerError> {
+        Ok(self.section(name)?.element_type)
+    }
+
     /// A section's bytes, of whatever type; they start at a multiple of [`ALIGNMENT`] in the file.
     ///
     /// # Errors
@@ -134,24 +142,43 @@ impl<'a> Container<'a> {
         budget: &mut ByteBudget,
     ) -> Result<Vec<T>, ContainerError> {
         let numbers = self.numbers::<T>(name, budget)?;
-        match numbers.iter().position(|&x| !x.into().is_finite()) {
-            None => Ok(numbers),
-            Some(k) => {
-                let at = self.section(name)?.offset + k * T::TYPE.size();
-                let found: f64 = numbers[k].into();
-                Err(malformed("number", at, "a finite one", found))
-            }
+        check_finite(self.section(name)?, &numbers)?;
+        Ok(numbers)
+    }
+
+    /// [`Container::bytes`] of a section that must have that type.
+    pub(crate) fn typed_bytes(
+        &self,
+        name: &str,
+        element_type: ElementType,
+    ) -> Result<&'a [u8], ContainerError> {
+        Ok(self.typed_section(name, element_type)?.content)
+    }
+
+    /// The error for a section whose content breaks a rule of its reader: `at` counts bytes from the
+    /// section's start.
+    pub(crate) fn fault(
+        &self,
+        name: &str,
+        what: &'static str,
+        at: usize,
+        expected: impl ToString,
+        found: impl ToString,
+    ) -> ContainerError {
+        match self.section(name) {
+            Ok(section) => malformed(what, section.offset + at, expected, found),
+            Err(missing) => missing,
         }
     }
 
-    fn section(&self, name: &str) -> Result<&Section<'a>, ContainerError> {
+    pub(super) fn section(&self, name: &str) -> Result<&Section<'a>, ContainerError> {
         let found = self.sections.iter().find(|section| section.name == name);
         found.ok_or_else(|| ContainerError::MissingSection {
             name: name.to_owned(),
         })
     }
 
-    fn typed_section(
+    pub(super) fn typed_section(
         &self,
         name: &str,
         wanted: ElementType,
@@ -168,6 +195,21 @@ impl<'a> Container<'a> {
             expected,
             found,
         ))
+    }
+}
+
+/// Refuses the first number that is infinite or not a number.
+pub(super) fn check_finite<T: Element + Into<f64>>(
+    section: &Section,
+    numbers: &[T],
+) -> Result<(), ContainerError> {
+    match numbers.iter().position(|&x| !x.into().is_finite()) {
+        None => Ok(()),
+        Some(k) => {
+            let at = section.offset + k * T::TYPE.size();
+            let found: f64 = numbers[k].into();
+            Err(malformed("number", at, "a finite one", found))
+        }
     }
 }
 
@@ -250,7 +292,7 @@ fn read_entry(bytes: &[u8], entry: usize, used_end: usize) -> Result<Section<'_>
     let element_type = ElementType::ALL
         .into_iter()
         .find(|&known| known as u32 == code)
-        .ok_or_else(|| malformed("element type", entry + 24, "a code from 0 to 6", code))?;
+        .ok_or_else(|| malformed("element type", entry + 24, "a code from 0 to 8", code))?;
     // One place is legal, so that sections can neither overlap nor hide bytes between them.
     let expected = used_end.next_multiple_of(ALIGNMENT);
     let found = get_u64(bytes, entry + 8);

@@ -191,7 +191,7 @@ fn broken_tables_are_named() {
         field(&|b| b.copy_within(FIRST_ENTRY..FIRST_ENTRY + 8, second)),
         "section name"
     );
-    assert_eq!(field(&|b| put_u32(b, FIRST_ENTRY + 24, 7)), "element type");
+    assert_eq!(field(&|b| put_u32(b, FIRST_ENTRY + 24, 9)), "element type");
     // Overlapping, out of order, leaving a gap, beyond the end, wrapping round.
     for offset in [FIRST_CONTENT as u64, 0, 320 + 64, 1 << 20, u64::MAX] {
         assert_eq!(field(&|b| put_u64(b, second + 8, offset)), "section offset");
