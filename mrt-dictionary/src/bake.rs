@@ -1,146 +1,286 @@
 //! The bake: from canonical shapes to a dictionary, a list of calls.
 
-use crate::bounce::{Reconstruction, closed_cube_bounce, restrict_to_shape};
+use crate::bounce::{Reconstruction, closed_cube_bounce};
 use crate::config::BakeConfig;
+use crate::emission::{EmissionBasis, emission_basis, emitter_radiosity};
 use crate::interface::{
-    InterfaceOperators, LightfieldBasis, emitted_lightfield, enriched_basis, interface_operators,
-    lightfield_basis, lightfield_from_coefficients,
+    InterfaceOperators, InterfaceSetup, LightfieldBasis, emitted_lightfield, enriched_basis,
+    interface_operators, lightfield_basis,
 };
+use crate::joint::{JointBasis, OwnLight, joint_basis};
 use crate::lightfield::LightfieldGrid;
-use crate::prior::{direct_samples, enriched_prior, light_prior};
+use crate::outputs::{ProbeSamples, probe_operator, vector_irradiance};
+use crate::path_transport::Gather;
 use crate::progress::{Cancelled, Progress};
-use crate::symmetry::texel_parity_classes;
-use crate::transport::{BlockTransport, block_transport, fold_bounce};
-use mrt_core::matrix::Matrix;
-use mrt_runtime::dictionary::{self, Dictionary, ShapeOperators};
-use mrt_runtime::shape::{SHAPES, Shape};
+use crate::response::{ResponseBasis, response_basis, rows, stack};
+use crate::shape_transport::{ShapeTransport, neighbours, shape_transport};
+use mrt_core::matrix::{Matrix, multiply};
+use mrt_runtime::dictionary::{
+    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
+};
+use mrt_runtime::path::Word;
+use mrt_runtime::shape::{Hole, Outline, Shape, shape_set};
 
-/// Bakes all [`SHAPES`] with settings that pass [`BakeConfig::check`]. The same settings give the same bits
+/// Bakes a set of shapes with settings that pass [`BakeConfig::check`]. The same settings give the same bits
 /// on every machine and thread count.
 ///
 /// # Errors
 /// [`Cancelled`].
 pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Cancelled> {
-    let steps = SHAPES.len() + 4 + config.lightfield.enrichment_rounds;
-    progress.step("one-bounce operator", 0, steps)?;
+    let shapes = shape_set(&config.shapes).unwrap_or_default();
+    let set = Set::of(&shapes);
+    let steps = 2 * shapes.len() + 6 + config.lightfield.enrichment_rounds;
+    let mut done = 0;
+    let mut step = |what: &str| {
+        done += 1;
+        progress.step(what, done - 1, steps)
+    };
+    step("one-bounce operator")?;
     let closed = closed_cube_bounce(config.resolution, Reconstruction::Constant, progress)?;
-    let mut transports = Vec::with_capacity(SHAPES.len());
-    for (index, shape) in SHAPES.iter().enumerate() {
-        progress.step(shape.name, 1 + index, steps)?;
-        transports.push(bake_shape(shape, &closed, config));
+    step("light beyond openings")?;
+    let neighbours = neighbours(config, &set.outlines)?;
+    let mut transports = Vec::with_capacity(shapes.len());
+    for shape in &shapes {
+        step(shape.name)?;
+        transports.push(shape_transport(shape, &closed, &neighbours, config));
     }
-    let mut step = 1 + SHAPES.len();
-    progress.step("lightfields at the openings", step, steps)?;
-    let grid = LightfieldGrid::new(&config.lightfield);
-    let classes = grid.parity_classes();
-    let emitted = emitted_lightfields(&grid, &transports, config.resolution, progress)?;
-    let all: Vec<Matrix<f64>> = emitted.iter().flatten().cloned().collect();
-    let modes = config.lightfield.lightfield_modes;
-    let mut basis = lightfield_basis(&classes, &all, modes, progress)?;
-    for _ in 0..config.lightfield.enrichment_rounds {
-        step += 1;
-        progress.step("lightfield enrichment", step, steps)?;
-        basis = enriched_basis(&grid, &classes, &basis, &config.lightfield, progress)?;
-    }
-    progress.step("lightfield operators", step + 1, steps)?;
-    let interface = interface_operators(
-        &grid,
-        &basis,
-        &config.lightfield,
-        config.resolution,
+    step("paths through openings")?;
+    let emission = emission(&shapes, &transports, config, &set);
+    let words = Word::all(
+        config.coupling.depth,
+        if set.holes.is_empty() { 0 } else { config.coupling.hole_depth },
+        &set.holes,
+        set.has_exchanges,
+    );
+    let gather = Gather {
+        resolution: config.resolution,
+        probes: config.outputs.probes,
+        vector: config.outputs.vector,
+    };
+    let response = response_basis(
+        &words,
+        &emission,
+        &gather,
+        config.coupling.response_modes,
+        set.has_exchanges,
         progress,
     )?;
-    progress.step("projections", step + 2, steps)?;
-    Ok(pack(config, transports, &emitted, &basis, &interface))
-}
-
-/// Everything about one shape alone.
-fn bake_shape(shape: &Shape, closed: &Matrix<f64>, config: &BakeConfig) -> BlockTransport {
-    let classes = texel_parity_classes(shape, config.resolution);
-    let bounce = restrict_to_shape(closed, shape, config.resolution);
-    let folded = fold_bounce(&bounce, &classes);
-    let samples = direct_samples(shape, config.resolution, &config.prior);
-    let prior = light_prior(&samples, &classes, config.prior.k_d);
-    let plain = block_transport(&folded, &prior.basis, &classes, config.modes);
-    match &config.enrichment {
-        None => plain,
-        Some(enrichment) => {
-            let enriched =
-                enriched_prior(&prior, &plain.indirect_basis, shape, &classes, enrichment);
-            block_transport(&folded, &enriched.basis, &classes, config.modes)
-        }
+    let mut entries = Vec::with_capacity(shapes.len());
+    for (shape, transport) in shapes.iter().zip(&transports) {
+        step(shape.name)?;
+        entries.push(pack_shape(shape, transport, &emission, &response, config, &set));
     }
-}
-
-/// `H_lf` by shape and opening.
-fn emitted_lightfields(
-    grid: &LightfieldGrid,
-    transports: &[BlockTransport],
-    resolution: usize,
-    progress: &Progress,
-) -> Result<Vec<Vec<Matrix<f64>>>, Cancelled> {
-    SHAPES
-        .iter()
-        .zip(transports)
-        .map(|(shape, transport)| {
-            shape
-                .openings
-                .iter()
-                .map(|&opening| {
-                    progress.check()?;
-                    let radiosity = &transport.implicit_lighting;
-                    Ok(emitted_lightfield(
-                        grid, shape, opening, radiosity, resolution,
-                    ))
-                })
-                .collect()
-        })
-        .collect()
-}
-
-fn pack(
-    config: &BakeConfig,
-    transports: Vec<BlockTransport>,
-    emitted: &[Vec<Matrix<f64>>],
-    basis: &LightfieldBasis,
-    interface: &InterfaceOperators,
-) -> Dictionary {
-    let shapes = transports
-        .into_iter()
-        .zip(&SHAPES)
-        .zip(emitted)
-        .map(|((transport, shape), emitted)| {
-            let modes = transport.indirect_basis.columns();
-            ShapeOperators {
-                shape,
-                coefficients_from_direct: transport.coefficients_from_direct.cast(),
-                indirect_basis: transport.indirect_basis.cast(),
-                implicit_lighting: transport.implicit_lighting.cast(),
-                lightfield_from_coefficients: emitted
-                    .iter()
-                    .map(|field| lightfield_from_coefficients(basis, field).cast())
-                    .collect(),
-                singular_values: transport.singular_values[..modes]
-                    .iter()
-                    .map(|&s| s as f32)
-                    .collect(),
-                dropped_energy: transport.dropped_energy as f32,
-            }
-        })
-        .collect();
-    Dictionary {
+    step("lightfields at the openings")?;
+    let grid = LightfieldGrid::new(&config.lightfield);
+    let classes = grid.parity_classes();
+    let emitted = emitted_lightfield(&grid, &emission.radiosity, config.resolution);
+    let scaled = emitted.scaled_columns(&emission.scales);
+    let modes = config.lightfield.lightfield_modes;
+    let mut basis = lightfield_basis(&classes, &[scaled], modes, progress)?;
+    for _ in 0..config.lightfield.enrichment_rounds {
+        step("lightfield enrichment")?;
+        basis = enriched_basis(
+            &grid,
+            &classes,
+            &basis,
+            &config.lightfield,
+            set.has_exchanges,
+            progress,
+        )?;
+    }
+    step("lightfield operators")?;
+    let setup = InterfaceSetup {
+        resolution: config.resolution,
+        probes: config.outputs.probes,
+        has_exchanges: set.has_exchanges,
+        holes: set.holes.clone(),
+    };
+    let interface = interface_operators(&grid, &basis, &emitted, &response, &setup, progress)?;
+    Ok(Dictionary {
         preset: config.preset.clone(),
         settings: config.describe(),
         resolution: config.resolution,
-        shapes,
-        interface: dictionary::InterfaceOperators {
-            straight: interface.straight.cast(),
-            left: interface.left.cast(),
-            right: interface.right.cast(),
-            response_from_lightfield: interface.response_from_lightfield.cast(),
-            response_basis: interface.response_basis.cast(),
-            lightfield_dropped_energy: basis.dropped_energy as f32,
-            response_dropped_energy: interface.dropped_energy as f32,
+        probes: config.outputs.probes,
+        shapes: entries,
+        lightfields: pack_lightfields(&basis, &interface),
+        sources: Some(pack_sources(&emission, &response, config.resolution)),
+        paths: pack_paths(words, &emission, response),
+    })
+}
+
+/// What a set of shapes needs.
+struct Set {
+    /// True with vertical openings.
+    has_exchanges: bool,
+    outlines: Vec<Outline>,
+    holes: Vec<Hole>,
+}
+
+impl Set {
+    fn of(shapes: &[&Shape]) -> Self {
+        let openings = || shapes.iter().flat_map(|shape| shape.openings);
+        let has = |outline: Outline| openings().any(|opening| opening.outline == outline);
+        let holes: Vec<Hole> = Hole::ALL
+            .into_iter()
+            .filter(|&hole| has(Outline::Hole(hole)))
+            .collect();
+        Self {
+            has_exchanges: openings().any(|opening| opening.face.axis() == 1),
+            outlines: std::iter::once(Outline::Whole)
+                .chain(holes.iter().map(|&hole| Outline::Hole(hole)))
+                .collect(),
+            // Words and masks are indexed by position in `Hole::ALL`.
+            holes: if holes.is_empty() { holes } else { Hole::ALL.to_vec() },
+        }
+    }
+
+    fn exchanges(&self) -> &'static [bool] {
+        if self.has_exchanges { &[false, true] } else { &[false] }
+    }
+}
+
+/// The emission basis of all that the shapes send.
+fn emission(
+    shapes: &[&'static Shape],
+    transports: &[ShapeTransport],
+    config: &BakeConfig,
+    set: &Set,
+) -> EmissionBasis {
+    let mut sent = Vec::new();
+    for (shape, transport) in shapes.iter().zip(transports) {
+        let radiosity = &transport.implicit_lighting;
+        for opening in shape.openings.iter().filter(|_| radiosity.columns() > 0) {
+            for &is_exchanged in set.exchanges() {
+                sent.push(emitter_radiosity(
+                    shape,
+                    opening.face,
+                    is_exchanged,
+                    radiosity,
+                    config.resolution,
+                ));
+            }
+        }
+    }
+    emission_basis(&sent, config.resolution, config.coupling.emission_modes)
+}
+
+/// The joint basis and the openings of one shape.
+fn pack_shape(
+    shape: &'static Shape,
+    transport: &ShapeTransport,
+    emission: &EmissionBasis,
+    response: &ResponseBasis,
+    config: &BakeConfig,
+    set: &Set,
+) -> ShapeOperators {
+    let (resolution, probes) = (config.resolution, config.outputs.probes);
+    let radiosity = &transport.implicit_lighting;
+    let operator = probe_operator(shape, resolution, probes);
+    let own = OwnLight {
+        irradiance: transport.indirect_basis.clone(),
+        probes: multiply(operator.view(), radiosity.view()),
+        vector: if config.outputs.vector {
+            vector_irradiance(shape, resolution, radiosity)
+        } else {
+            Matrix::zeros(0, radiosity.columns())
         },
+    };
+    let JointBasis {
+        irradiance,
+        probes: probe_basis,
+        vector,
+        joint_from_response,
+        dropped_energy,
+    } = joint_basis(
+        shape,
+        &own,
+        response,
+        resolution,
+        probes,
+        config.coupling.foreign_modes,
+        set.has_exchanges,
+    );
+    let openings = shape
+        .openings
+        .iter()
+        .zip(&joint_from_response)
+        .map(|(opening, joint_from_response)| OpeningOperators {
+            emission_from_coefficients: set
+                .exchanges()
+                .iter()
+                .map(|&is_exchanged| {
+                    let sent = emitter_radiosity(
+                        shape,
+                        opening.face,
+                        is_exchanged,
+                        radiosity,
+                        resolution,
+                    );
+                    multiply(emission.from_radiosity.view(), sent.view()).cast()
+                })
+                .collect(),
+            joint_from_response: joint_from_response.iter().map(Matrix::cast).collect(),
+        })
+        .collect();
+    let modes = radiosity.columns();
+    ShapeOperators {
+        shape,
+        coefficients_from_direct: transport.coefficients_from_direct.cast(),
+        joint_basis: irradiance.cast(),
+        probe_basis: probe_basis.cast(),
+        vector_basis: vector.cast(),
+        openings,
+        implicit_lighting: radiosity.cast(),
+        singular_values: transport.singular_values[..modes]
+            .iter()
+            .map(|&s| s as f32)
+            .collect(),
+        dropped_energy: transport.dropped_energy as f32,
+        joint_dropped_energy: dropped_energy as f32,
+    }
+}
+
+fn pack_lightfields(
+    basis: &LightfieldBasis,
+    interface: &InterfaceOperators,
+) -> LightfieldOperators {
+    LightfieldOperators {
+        parity: basis.classes.iter().map(|&class| class as u8).collect(),
+        from_emission: interface.from_emission.cast(),
+        straight: interface.straight.cast(),
+        left: interface.left.cast(),
+        exchange: interface.exchange.cast(),
+        holes: interface.holes.iter().map(Matrix::cast).collect(),
+        response_from_lightfield: interface.response_from_lightfield.cast(),
+        dropped_energy: basis.dropped_energy as f32,
+    }
+}
+
+fn pack_sources(emission: &EmissionBasis, response: &ResponseBasis, resolution: usize) -> Sources {
+    let walls = 5 * resolution * resolution;
+    let samples = rows(&response.basis, walls..response.basis.rows());
+    let probes = ProbeSamples::default().to_sh(&samples, crate::outputs::PROBE_WEIGHT);
+    Sources {
+        emission_from_radiosity: emission.from_radiosity.cast(),
+        response_basis: stack(&rows(&response.basis, 0..walls), &probes).cast(),
+    }
+}
+
+fn pack_paths(words: Vec<Word>, emission: &EmissionBasis, response: ResponseBasis) -> PathTable {
+    let mut entries: Vec<PathEntry> = words
+        .into_iter()
+        .zip(&response.paths)
+        .map(|(word, operator)| PathEntry {
+            word,
+            response_from_emission: operator.cast(),
+        })
+        .collect();
+    entries.sort_by(|a, b| a.word.cmp(&b.word));
+    PathTable {
+        emission_parity: emission.parity.clone(),
+        response_parity: response.parity,
+        entries,
+        emission_dropped_energy: emission.dropped_energy as f32,
+        response_dropped_energy: response.dropped_energy as f32,
     }
 }

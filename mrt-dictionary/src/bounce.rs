@@ -11,7 +11,7 @@ use glam::DVec3;
 use mrt_core::cube::Face;
 use mrt_core::form_factor::point_to_polygon;
 use mrt_core::matrix::Matrix;
-use mrt_runtime::shape::{SHAPES, Shape};
+use mrt_runtime::shape::{Outline, SHAPES, Shape};
 use rayon::prelude::*;
 
 /// How radiosity between texel centres is reconstructed from the values there.
@@ -64,7 +64,8 @@ pub fn closed_cube_bounce(
     Ok(bounce)
 }
 
-/// The operator of a shape: the closed cube's, without the rows and columns of missing faces.
+/// The operator of a shape: the closed cube's, without the rows and columns of missing faces, and with holes cut
+/// out of the texels that they touch.
 pub fn restrict_to_shape(closed: &Matrix<f64>, shape: &Shape, resolution: usize) -> Matrix<f64> {
     let kept: Vec<usize> = shape
         .walls()
@@ -73,7 +74,62 @@ pub fn restrict_to_shape(closed: &Matrix<f64>, shape: &Shape, resolution: usize)
             start..start + resolution * resolution
         })
         .collect();
-    Matrix::from_fn(kept.len(), kept.len(), |i, j| closed[(kept[i], kept[j])])
+    let mut bounce = Matrix::from_fn(kept.len(), kept.len(), |i, j| closed[(kept[i], kept[j])]);
+    cut_holes(&mut bounce, shape, resolution);
+    bounce
+}
+
+/// Takes the part of each source texel that is in a hole away, exactly; receivers in a hole get nothing.
+fn cut_holes(bounce: &mut Matrix<f64>, shape: &Shape, resolution: usize) {
+    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
+    for (source, &(face, center)) in texels.iter().enumerate() {
+        let Some(missing) = missing_part(shape, face, center, resolution) else {
+            continue;
+        };
+        for (receiver, &(wall, point)) in texels.iter().enumerate() {
+            if wall != face {
+                let factor = point_to_polygon(point, -wall.outward(), &missing);
+                // Where the whole texel is missing, what is left is rounding.
+                let rest = bounce[(receiver, source)] - factor;
+                bounce[(receiver, source)] = if rest < 1e-13 { 0.0 } else { rest };
+            }
+        }
+    }
+    for (receiver, &(face, center)) in texels.iter().enumerate() {
+        if shape.is_in_hole(face, center) {
+            for source in 0..texels.len() {
+                bounce[(receiver, source)] = 0.0;
+            }
+        }
+    }
+}
+
+/// The part of a texel that is in the hole of its wall.
+fn missing_part(
+    shape: &Shape,
+    face: Face,
+    center: DVec3,
+    resolution: usize,
+) -> Option<[DVec3; 4]> {
+    let Outline::Hole(hole) = shape.opening(face)?.outline else {
+        return None;
+    };
+    let half = 0.5 / resolution as f64;
+    let overlap = |axis: usize, [low, high]: [f64; 2]| {
+        [low.max(center[axis] - half), high.min(center[axis] + half)]
+    };
+    let [u, v] = hole.rectangle();
+    let (u, v) = (overlap(face.u_axis(), u), overlap(face.v_axis(), v));
+    (u[0] < u[1] && v[0] < v[1]).then(|| face.rectangle(u, v))
+}
+
+/// Fraction of a texel that is wall.
+pub fn wall_fraction(shape: &Shape, face: Face, center: DVec3, resolution: usize) -> f64 {
+    let Some([a, b, _, d]) = missing_part(shape, face, center, resolution) else {
+        return 1.0;
+    };
+    let area = (b - a).length() * (d - a).length() * (resolution * resolution) as f64;
+    (1.0 - area).max(0.0)
 }
 
 /// Factors from all texels of the closed cube to one receiver.

@@ -1,6 +1,7 @@
 //! Settings of a bake and the named presets.
 
 use mrt_runtime::dictionary_file::MAX_MODES;
+use mrt_runtime::shape::{SHAPE_SETS, shape_set};
 
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +18,39 @@ pub struct BakeConfig {
     pub enrichment: Option<Enrichment>,
     /// Interface lightfields.
     pub lightfield: LightfieldConfig,
+    /// The set of shapes, one of [`SHAPE_SETS`].
+    pub shapes: String,
+    /// Transport between blocks.
+    pub coupling: CouplingConfig,
+    /// What is computed besides irradiance.
+    pub outputs: OutputConfig,
+}
+
+/// Transport between blocks, by whole paths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CouplingConfig {
+    /// Emission modes, at most.
+    pub emission_modes: usize,
+    /// Response modes `k_r`, at most.
+    pub response_modes: usize,
+    /// Modes that light from other blocks adds to a shape's own, at most.
+    pub foreign_modes: usize,
+    /// Openings that a path of the table crosses, at most.
+    pub depth: usize,
+    /// The same for paths with a hole in a wall.
+    pub hole_depth: usize,
+    /// Weight of the light on the walls beyond each opening against that on the shape's own, when its modes are
+    /// chosen.
+    pub beyond_weight: f64,
+}
+
+/// What is computed besides irradiance.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OutputConfig {
+    /// Probes along an edge of a block; 0 for none.
+    pub probes: usize,
+    /// True for vector irradiance, four coefficients a texel.
+    pub vector: bool,
 }
 
 /// The light prior's samples.
@@ -57,8 +91,6 @@ pub struct LightfieldConfig {
     pub super_samples: usize,
     /// Lightfield modes `k_rlf`, at most.
     pub lightfield_modes: usize,
-    /// Response modes `k_r`, at most.
-    pub response_modes: usize,
     /// Rounds of interface enrichment (appendix A).
     pub enrichment_rounds: usize,
     /// Frobenius weight of the propagated lightfields against the emitted ones.
@@ -71,6 +103,15 @@ pub enum ConfigError {
     /// No preset of that name.
     #[error("preset `{found}`; expected one of {}", PRESETS.join(", "))]
     UnknownPreset {
+        /// The name given.
+        found: String,
+    },
+    /// No set of shapes of that name.
+    #[error(
+        "set of shapes `{found}`; expected one of {}",
+        SHAPE_SETS.map(|set| set.0).join(", ")
+    )]
+    UnknownSet {
         /// The name given.
         found: String,
     },
@@ -94,6 +135,9 @@ pub const MAX_BAKE_RESOLUTION: usize = 32;
 /// Largest number of lightfield samples times modes: 2 GiB a matrix, of which a bake holds several.
 const MAX_LIGHTFIELD_NUMBERS: f64 = (1u64 << 28) as f64;
 
+/// Longest paths of a table: 3D sets have a third more than triple the paths for each opening more.
+const MAX_PATH_DEPTH: f64 = 8.0;
+
 /// Names of the presets.
 pub const PRESETS: [&str; 3] = ["mobile", "standard", "quality"];
 
@@ -103,10 +147,10 @@ impl BakeConfig {
     /// # Errors
     /// [`ConfigError::UnknownPreset`].
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
-        let (resolution, modes, lightfield_modes, response_modes) = match name {
-            "mobile" => (6, 12, 64, 12),
-            "standard" => (16, 32, 128, 32),
-            "quality" => (16, 96, 192, 64),
+        let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name {
+            "mobile" => (6, 12, 64, [32, 24, 6], 3),
+            "standard" => (16, 32, 128, [96, 64, 16], 5),
+            "quality" => (16, 96, 192, [160, 128, 32], 5),
             _ => {
                 return Err(ConfigError::UnknownPreset {
                     found: name.to_owned(),
@@ -121,8 +165,19 @@ impl BakeConfig {
             enrichment: Some(Enrichment::default()),
             lightfield: LightfieldConfig {
                 lightfield_modes,
-                response_modes,
                 ..LightfieldConfig::default()
+            },
+            shapes: SHAPE_SETS[0].0.to_owned(),
+            coupling: CouplingConfig {
+                emission_modes: emission,
+                response_modes: response,
+                foreign_modes: foreign,
+                depth,
+                ..CouplingConfig::default()
+            },
+            outputs: OutputConfig {
+                probes: if name == "mobile" { 2 } else { 4 },
+                vector: false,
             },
         })
     }
@@ -132,6 +187,11 @@ impl BakeConfig {
     /// # Errors
     /// [`ConfigError::OutOfRange`], for the first that is not within its bounds.
     pub fn check(&self) -> Result<(), ConfigError> {
+        if shape_set(&self.shapes).is_none() {
+            return Err(ConfigError::UnknownSet {
+                found: self.shapes.clone(),
+            });
+        }
         let lightfield = &self.lightfield;
         let max_modes = MAX_MODES as f64;
         let max_resolution = MAX_BAKE_RESOLUTION as f64;
@@ -172,10 +232,41 @@ impl BakeConfig {
                 max_modes,
             ),
             (
-                "number of response modes",
-                lightfield.response_modes as f64,
+                "number of emission modes",
+                self.coupling.emission_modes as f64,
                 1.0,
                 max_modes,
+            ),
+            (
+                "number of response modes",
+                self.coupling.response_modes as f64,
+                1.0,
+                max_modes,
+            ),
+            (
+                "number of foreign modes",
+                self.coupling.foreign_modes as f64,
+                0.0,
+                max_modes,
+            ),
+            (
+                "path depth",
+                self.coupling.depth as f64,
+                1.0,
+                MAX_PATH_DEPTH,
+            ),
+            (
+                "path depth through holes",
+                self.coupling.hole_depth as f64,
+                1.0,
+                MAX_PATH_DEPTH,
+            ),
+            ("beyond weight", self.coupling.beyond_weight, 0.0, 1000.0),
+            (
+                "probes along an edge",
+                self.outputs.probes as f64,
+                0.0,
+                8.0,
             ),
             (
                 "lightfield samples times modes",
@@ -219,7 +310,7 @@ impl BakeConfig {
                 e.uniform_weight, e.constant_weight, e.indirect_weight
             ),
         };
-        let (prior, field) = (&self.prior, &self.lightfield);
+        let (prior, field, coupling) = (&self.prior, &self.lightfield, &self.coupling);
         let k_d = match prior.k_d {
             usize::MAX => "all".to_owned(),
             k_d => k_d.to_string(),
@@ -227,7 +318,9 @@ impl BakeConfig {
         format!(
             "{0}² texels a wall, k_b <= {1}; prior of {2}³ lights of radius {3} inside and beyond each \
              opening, k_d {k_d}, {enrichment}; lightfields of {4}² positions x {5}² directions with {6}² \
-             super-samples, k_rlf <= {7}, k_r <= {8}, {9} enrichment rounds of weight {10}",
+             super-samples, k_rlf <= {7}, {8} enrichment rounds of weight {9}; {10} with paths of up to {11} \
+             openings ({12} with a hole), k_e <= {13}, k_r <= {14}, up to {15} modes for foreign light, weight \
+             {16} beyond openings; {17}³ probes{18}",
             self.resolution,
             self.modes,
             prior.lights_per_axis,
@@ -236,9 +329,17 @@ impl BakeConfig {
             field.directions,
             field.super_samples,
             field.lightfield_modes,
-            field.response_modes,
             field.enrichment_rounds,
             field.enrichment_weight,
+            self.shapes,
+            coupling.depth,
+            coupling.hole_depth,
+            coupling.emission_modes,
+            coupling.response_modes,
+            coupling.foreign_modes,
+            coupling.beyond_weight,
+            self.outputs.probes,
+            if self.outputs.vector { ", vector irradiance" } else { "" },
         )
     }
 }
@@ -264,6 +365,20 @@ impl Default for Enrichment {
     }
 }
 
+impl Default for CouplingConfig {
+    /// The standard preset's.
+    fn default() -> Self {
+        Self {
+            emission_modes: 96,
+            response_modes: 64,
+            foreign_modes: 16,
+            depth: 5,
+            hole_depth: 3,
+            beyond_weight: 1.0,
+        }
+    }
+}
+
 impl Default for LightfieldConfig {
     /// The paper's resolution and mode counts (section 7.1), with the super-sampling and the single round
     /// of enrichment that measured best.
@@ -273,7 +388,6 @@ impl Default for LightfieldConfig {
             directions: 24,
             super_samples: 3,
             lightfield_modes: 128,
-            response_modes: 32,
             enrichment_rounds: 1,
             enrichment_weight: 1.0,
         }

@@ -8,15 +8,18 @@ use crate::config::LightfieldConfig;
 use crate::lightfield::{LightfieldGrid, frame_of_heading};
 use crate::prior::root_sum_of_squares;
 use crate::progress::{Cancelled, Progress};
-use crate::symmetry::texel_parity_classes;
+use crate::outputs::{PROBE_WEIGHT, ProbeSamples, SH9, probe_points, sh_of_unit_radiosity};
+use crate::path_transport::{EMITTER, RECEIVER};
+use crate::response::{ResponseBasis, stack};
 use crate::transport::whole_multiplets;
 use glam::{DVec2, DVec3};
 use mrt_core::cube::Face;
 use mrt_core::form_factor::point_to_polygon;
 use mrt_core::matrix::{Matrix, dot, transpose_multiply};
 use mrt_core::parity::ParityClasses;
-use mrt_core::svd::{dropped_energy_beyond_first, largest_entry_sign, svd, symmetric_eigen};
-use mrt_runtime::shape::Shape;
+use mrt_core::polygon_moments::polygon_moments;
+use mrt_core::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
+use mrt_runtime::shape::Hole;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -36,51 +39,38 @@ pub struct LightfieldBasis {
 /// Operators of the canonical interface.
 #[derive(Clone, Debug)]
 pub struct InterfaceOperators {
+    /// Lightfield modes x emission modes: what leaves a shape.
+    pub from_emission: Matrix<f64>,
     /// Through a cube, straight on: modes x modes.
     pub straight: Matrix<f64>,
     /// Out through the side at u = 1 (left of the heading when v is up).
     pub left: Matrix<f64>,
-    /// Out through the side at u = 0.
-    pub right: Matrix<f64>,
+    /// With u and v exchanged: modes x modes, or no rows.
+    pub exchange: Matrix<f64>,
+    /// What passes each hole: modes x modes.
+    pub holes: Vec<Matrix<f64>>,
     /// `T_rlf->r`, response modes x lightfield modes.
     pub response_from_lightfield: Matrix<f64>,
-    /// `U_r`, texels of the cube open at -z only x response modes, orthonormal columns.
-    pub response_basis: Matrix<f64>,
-    /// Singular values of the response.
-    pub response_singular_values: Vec<f64>,
-    /// Fraction that the modes left out hold of the response's energy beyond its first mode.
-    pub dropped_energy: f64,
 }
 
-/// The cube behind the canonical interface.
-pub static RECEIVER: Shape = Shape {
-    name: "receiver",
-    openings: &[Face::NegZ],
-};
-
-/// Radiance that leaves a shape through one of its openings when its walls emit the columns of
-/// `radiosity` (texels x modes): flux-weighted samples x modes.
+/// Radiance that leaves the canonical emitter when its walls emit the columns of `radiosity` (texels x modes):
+/// flux-weighted samples x modes.
 pub fn emitted_lightfield(
     grid: &LightfieldGrid,
-    shape: &Shape,
-    opening: Face,
     radiosity: &Matrix<f64>,
     resolution: usize,
 ) -> Matrix<f64> {
     let by_texel = radiosity.transposed();
-    let frame = frame_of_heading(opening);
     grid.tabulate(radiosity.columns(), |position, direction, out| {
         let uv = grid.position(position);
-        // In the canonical frame the light leaves at z = 1 towards +z.
         let leaving = DVec3::new(uv.x, uv.y, 1.0);
         let supers = grid.super_directions(direction);
         for &toward in supers {
             let (face, hit) = wall_behind(leaving, toward);
-            let Some(offset) = shape.wall_offset(frame.face(face), resolution) else {
+            let Some(offset) = EMITTER.wall_offset(face, resolution) else {
                 continue;
             };
-            let hit = frame.point(hit);
-            let texel = offset + frame.face(face).texel_index(hit, resolution);
+            let texel = offset + face.texel_index(hit, resolution);
             for (value, &radiosity) in out.iter_mut().zip(by_texel.column(texel)) {
                 *value += radiosity;
             }
@@ -262,6 +252,7 @@ pub fn enriched_basis(
     classes: &ParityClasses,
     basis: &LightfieldBasis,
     config: &LightfieldConfig,
+    has_exchanges: bool,
     progress: &Progress,
 ) -> Result<LightfieldBasis, Cancelled> {
     let scaled = basis.vectors.scaled_columns(&basis.scales);
@@ -279,7 +270,11 @@ pub fn enriched_basis(
         let scales = vec![weight; m.columns()];
         m.scaled_columns(&scales)
     };
-    let columns = [scaled, rescale(straight), rescale(left), rescale(right)];
+    let mut columns = vec![scaled, rescale(straight), rescale(left), rescale(right)];
+    if has_exchanges {
+        let sideways = [exchanged(grid, &columns[2]), exchanged(grid, &columns[3])];
+        columns.extend(sideways);
+    }
     lightfield_basis(classes, &columns, config.lightfield_modes, progress)
 }
 
@@ -290,12 +285,16 @@ fn mirrored_columns(classes: &ParityClasses, columns: &Matrix<f64>) -> Matrix<f6
     })
 }
 
-/// Computes propagation and response of the canonical interface in the reduced basis.
+/// Computes emission, propagation and response of the canonical interface in the reduced basis.
+///
+/// # Errors
+/// [`Cancelled`].
 pub fn interface_operators(
     grid: &LightfieldGrid,
     basis: &LightfieldBasis,
-    config: &LightfieldConfig,
-    resolution: usize,
+    emitted: &Matrix<f64>,
+    response: &ResponseBasis,
+    setup: &InterfaceSetup,
     progress: &Progress,
 ) -> Result<InterfaceOperators, Cancelled> {
     let project = |m: &Matrix<f64>| parallel_transpose_multiply(&basis.vectors, m);
@@ -303,47 +302,67 @@ pub fn interface_operators(
     progress.check()?;
     let left = project(&propagated(grid, &basis.vectors, Exit::Left));
     progress.check()?;
-    // The mirror of u changes the sign of odd modes and exchanges left and right.
-    let sign = |mode: usize| {
-        if basis.classes[mode] & 1 == 1 {
-            -1.0
-        } else {
-            1.0
-        }
+    let exchange = if setup.has_exchanges {
+        project(&exchanged(grid, &basis.vectors))
+    } else {
+        Matrix::zeros(0, basis.vectors.columns())
     };
-    let right = Matrix::from_fn(left.rows(), left.columns(), |i, j| {
-        left[(i, j)] * sign(i) * sign(j)
-    });
-    let response = wall_response(grid, basis, resolution);
+    let holes = setup
+        .holes
+        .iter()
+        .map(|&hole| project(&masked(grid, &basis.vectors, hole)))
+        .collect();
     progress.check()?;
-    let scaled = response.scaled_columns(&basis.scales);
-    let classes = texel_parity_classes(&RECEIVER, resolution);
-    let mut parts: Vec<(f64, Vec<f64>)> = Vec::new();
-    for class in 0..classes.class_count() {
-        let part = svd(classes.fold_columns(class, &scaled).view());
-        for (k, &s) in part.singular_values.iter().enumerate() {
-            parts.push((s, classes.unfold(class, part.u.column(k))));
-        }
-    }
-    parts.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let response_singular_values: Vec<f64> = parts.iter().map(|part| part.0).collect();
-    let kept = whole_multiplets(&response_singular_values, config.response_modes);
-    let columns: Vec<&[f64]> = parts[..kept].iter().map(|part| part.1.as_slice()).collect();
-    let response_basis = Matrix::from_columns(response.rows(), &columns);
+    let light = response_of_modes(grid, basis, setup.resolution, setup.probes);
     Ok(InterfaceOperators {
+        from_emission: project(emitted),
         straight,
         left,
-        right,
-        response_from_lightfield: transpose_multiply(response_basis.view(), response.view()),
-        response_basis,
-        dropped_energy: dropped_energy_beyond_first(&response_singular_values, kept),
-        response_singular_values,
+        exchange,
+        holes,
+        response_from_lightfield: transpose_multiply(response.basis.view(), light.view()),
     })
 }
 
-/// `R_b->rlf` for one opening: what a shape with the given implicit lighting sends out, in the basis.
-pub fn lightfield_from_coefficients(basis: &LightfieldBasis, emitted: &Matrix<f64>) -> Matrix<f64> {
-    parallel_transpose_multiply(&basis.vectors, emitted)
+/// What [`interface_operators`] is asked for.
+#[derive(Clone, Debug)]
+pub struct InterfaceSetup {
+    /// Texels along an edge of a wall.
+    pub resolution: usize,
+    /// Probes along an edge of a block.
+    pub probes: usize,
+    /// True in sets with vertical openings.
+    pub has_exchanges: bool,
+    /// Holes of the set.
+    pub holes: Vec<Hole>,
+}
+
+/// Lightfields with u and v exchanged.
+pub fn exchanged(grid: &LightfieldGrid, fields: &Matrix<f64>) -> Matrix<f64> {
+    let (p, d) = (grid.positions, grid.directions);
+    let source = |sample: usize| {
+        let (x, rest) = (sample % d, sample / d);
+        let (y, rest) = (rest % d, rest / d);
+        let (i, j) = (rest % p, rest / p);
+        ((i * p + j) * d + x) * d + y
+    };
+    Matrix::from_fn(fields.rows(), fields.columns(), |s, k| fields[(source(s), k)])
+}
+
+/// What a hole lets through: each position counts with the fraction of its cell in the hole.
+fn masked(grid: &LightfieldGrid, fields: &Matrix<f64>, hole: Hole) -> Matrix<f64> {
+    let [u, v] = hole.rectangle();
+    let half = 0.5 / grid.positions as f64;
+    let overlap = |x: f64, [low, high]: [f64; 2]| {
+        ((high.min(x + half) - low.max(x - half)) / (2.0 * half)).max(0.0)
+    };
+    let fraction = |sample: usize| {
+        let uv = grid.position(sample / grid.direction_count());
+        overlap(uv.x, u) * overlap(uv.y, v)
+    };
+    Matrix::from_fn(fields.rows(), fields.columns(), |s, k| {
+        fraction(s) * fields[(s, k)]
+    })
 }
 
 fn parallel_transpose_multiply(a: &Matrix<f64>, b: &Matrix<f64>) -> Matrix<f64> {
@@ -362,54 +381,84 @@ const NEAR_CELLS: f64 = 4.0;
 /// Parts along each axis of a near cell.
 const NEAR_PARTS: usize = 4;
 
-/// `F_rlf`: irradiance on the receiver's texels from each mode, texels x modes.
+/// `F_rlf`: irradiance on the receiver's texels and weighted samples of its probes, from each mode.
 ///
-/// Each cell of the interface counts with its exact form factor and the radiance that the lightfield has
-/// from the cell's centre towards the texel.
-fn wall_response(grid: &LightfieldGrid, basis: &LightfieldBasis, resolution: usize) -> Matrix<f64> {
+/// Each cell of the interface counts with its exact form factor, or its exact moments at a probe, and the radiance
+/// that the lightfield has from the cell's centre towards the receiver.
+fn response_of_modes(
+    grid: &LightfieldGrid,
+    basis: &LightfieldBasis,
+    resolution: usize,
+    probes: usize,
+) -> Matrix<f64> {
     let by_sample = radiance_by_sample(grid, &basis.vectors);
     let texels: Vec<(Face, DVec3)> = RECEIVER.texels(resolution).collect();
     let modes = basis.vectors.columns();
-    let rows: Vec<Vec<f64>> = texels
+    let walls: Vec<Vec<f64>> = texels
         .par_iter()
         .map(|&(face, point)| {
             let mut row = vec![0.0; modes];
-            let cell = 1.0 / RESPONSE_CELLS as f64;
-            for j in 0..RESPONSE_CELLS {
-                for i in 0..RESPONSE_CELLS {
-                    let low = DVec2::new(i as f64, j as f64) * cell;
-                    let center = (low + 0.5 * cell).extend(0.0);
-                    let parts = if center.distance(point) < NEAR_CELLS * cell {
-                        NEAR_PARTS
-                    } else {
-                        1
-                    };
-                    let part = cell / parts as f64;
-                    for k in 0..parts * parts {
-                        let step = DVec2::new((k % parts) as f64, (k / parts) as f64);
-                        let low = low + step * part;
-                        add_cell(grid, &by_sample, low, part, (face, point), &mut row);
-                    }
-                }
-            }
+            for_each_cell(point, |cell| {
+                let factor = point_to_polygon(point, -face.outward(), &cell.corners);
+                let taps = grid.taps(cell.center, cell.direction);
+                accumulate(&by_sample, &taps, PI * factor, &mut row);
+            });
             row
         })
         .collect();
-    Matrix::from_fn(texels.len(), modes, |i, j| rows[i][j])
+    let points: Vec<DVec3> = probe_points(probes).collect();
+    let volume: Vec<Vec<f64>> = points
+        .par_iter()
+        .map(|&point| {
+            let mut rows = vec![0.0; SH9 * modes];
+            for_each_cell(point, |cell| {
+                let sh = sh_of_unit_radiosity(&polygon_moments(point, &cell.corners));
+                let taps = grid.taps(cell.center, cell.direction);
+                for (row, weight) in rows.chunks_exact_mut(modes).zip(sh) {
+                    accumulate(&by_sample, &taps, PI * weight, row);
+                }
+            });
+            rows
+        })
+        .collect();
+    let walls = Matrix::from_fn(texels.len(), modes, |i, j| walls[i][j]);
+    let volume = Matrix::from_fn(SH9 * points.len(), modes, |i, j| {
+        volume[i / SH9][i % SH9 * modes + j]
+    });
+    stack(&walls, &ProbeSamples::default().from_sh(&volume, PROBE_WEIGHT))
 }
 
-/// Adds the irradiance from one square cell of the interface.
-fn add_cell(
-    grid: &LightfieldGrid,
-    by_sample: &Matrix<f64>,
-    low: DVec2,
-    width: f64,
-    (face, point): (Face, DVec3),
-    row: &mut [f64],
-) {
-    let rectangle = Face::NegZ.rectangle([low.x, low.x + width], [low.y, low.y + width]);
-    let factor = point_to_polygon(point, -face.outward(), &rectangle);
-    let center = low + 0.5 * width;
-    let direction = (point - center.extend(0.0)).normalize();
-    accumulate(by_sample, &grid.taps(center, direction), PI * factor, row);
+/// A square part of the interface as a point behind it sees it.
+struct Cell {
+    corners: [DVec3; 4],
+    center: DVec2,
+    /// From its centre to the point.
+    direction: DVec3,
+}
+
+/// Cuts the interface into cells, finer near a point behind it.
+fn for_each_cell(point: DVec3, mut visit: impl FnMut(&Cell)) {
+    let cell = 1.0 / RESPONSE_CELLS as f64;
+    for j in 0..RESPONSE_CELLS {
+        for i in 0..RESPONSE_CELLS {
+            let low = DVec2::new(i as f64, j as f64) * cell;
+            let center = (low + 0.5 * cell).extend(0.0);
+            let parts = if center.distance(point) < NEAR_CELLS * cell {
+                NEAR_PARTS
+            } else {
+                1
+            };
+            let width = cell / parts as f64;
+            for k in 0..parts * parts {
+                let step = DVec2::new((k % parts) as f64, (k / parts) as f64);
+                let low = low + step * width;
+                let center = low + 0.5 * width;
+                visit(&Cell {
+                    corners: Face::NegZ.rectangle([low.x, low.x + width], [low.y, low.y + width]),
+                    center,
+                    direction: (point - center.extend(0.0)).normalize(),
+                });
+            }
+        }
+    }
 }

@@ -6,11 +6,17 @@
 
 pub mod config;
 pub mod progress;
+pub mod outputs;
 pub mod symmetry;
 pub mod bounce;
 pub mod bounce_rays;
 pub mod prior;
 pub mod transport;
+pub mod path_transport;
+pub mod shape_transport;
+pub mod emission;
+pub mod response;
+pub mod joint;
 pub mod lightfield;
 pub mod interface;
 pub mod bake;

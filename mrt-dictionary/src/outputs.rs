@@ -4,8 +4,11 @@
 //! [`DIRECTIONS`] instead, weighted so that both have the same norm: a mirror exchanges directions, where it would
 //! change signs of coefficients, so texels and probes fold into parity classes alike.
 
+use crate::bounce::wall_fraction;
 use glam::{DVec3, IVec3};
+use mrt_core::cube::Face;
 use mrt_core::matrix::Matrix;
+use mrt_core::ohlsh::ohlsh_from_moments;
 use mrt_core::polygon_moments::{Moments, polygon_moments};
 use mrt_core::sh;
 use mrt_runtime::shape::Shape;
@@ -123,19 +126,23 @@ pub fn probe_operator(shape: &Shape, resolution: usize, probes: usize) -> Matrix
     let points: Vec<DVec3> = probe_points(probes).collect();
     let step = 1.0 / resolution as f64;
     let half = 0.5 * step;
-    let texels: Vec<[DVec3; 4]> = shape
+    let texels: Vec<([DVec3; 4], f64)> = shape
         .texels(resolution)
         .map(|(face, c)| {
             let (u, v) = (c[face.u_axis()], c[face.v_axis()]);
-            face.rectangle([u - half, u + half], [v - half, v + half])
+            let corners = face.rectangle([u - half, u + half], [v - half, v + half]);
+            (corners, wall_fraction(shape, face, c, resolution))
         })
         .collect();
     let columns: Vec<Vec<f64>> = texels
         .par_iter()
-        .map(|texel| {
+        .map(|(corners, fraction)| {
             points
                 .iter()
-                .flat_map(|&point| sh_of_unit_radiosity(&polygon_moments(point, texel)))
+                .flat_map(|&point| {
+                    let sh = sh_of_unit_radiosity(&polygon_moments(point, corners));
+                    sh.map(|x| fraction * x)
+                })
                 .collect()
         })
         .collect();
@@ -145,6 +152,55 @@ pub fn probe_operator(shape: &Shape, resolution: usize, probes: usize) -> Matrix
 /// SH coefficients of incident radiance from a polygon of radiosity one.
 pub fn sh_of_unit_radiosity(moments: &Moments) -> [f64; SH9] {
     moments.sh9().map(|x| x / PI)
+}
+
+/// Vector irradiance on a shape's walls, 4 texels x signals, from the radiosity of their texels (texels x
+/// signals): the other walls' light, as the hemispherical coefficients of [`mrt_core::ohlsh`] in each texel's axes
+/// ([`texel_axes`]).
+pub fn vector_irradiance(shape: &Shape, resolution: usize, radiosity: &Matrix<f64>) -> Matrix<f64> {
+    let by_texel = radiosity.transposed();
+    let signals = radiosity.columns();
+    let half = 0.5 / resolution as f64;
+    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
+    let rows: Vec<Vec<f64>> = texels
+        .par_iter()
+        .map(|&(wall, point)| {
+            let axes = texel_axes(wall);
+            let mut rows = vec![0.0; 4 * signals];
+            if shape.is_in_hole(wall, point) {
+                return rows;
+            }
+            for (source, &(face, c)) in texels.iter().enumerate() {
+                if face == wall {
+                    continue;
+                }
+                let (u, v) = (c[face.u_axis()], c[face.v_axis()]);
+                let polygon = face.rectangle([u - half, u + half], [v - half, v + half]);
+                let weights = vector_of_unit_radiosity(&polygon_moments(point, &polygon), &axes);
+                let fraction = wall_fraction(shape, face, c, resolution);
+                for (row, weight) in rows.chunks_exact_mut(signals.max(1)).zip(weights) {
+                    for (sum, &x) in row.iter_mut().zip(by_texel.column(source)) {
+                        *sum += weight * fraction * x;
+                    }
+                }
+            }
+            rows
+        })
+        .collect();
+    Matrix::from_fn(4 * texels.len(), signals, |i, j| {
+        rows[i / 4][i % 4 * signals + j]
+    })
+}
+
+/// The frame in which a texel's vector irradiance is stored: along u, along v, along the normal.
+pub fn texel_axes(face: Face) -> [DVec3; 3] {
+    let axis = |k: usize| DVec3::AXES[k];
+    [axis(face.u_axis()), axis(face.v_axis()), -face.outward()]
+}
+
+/// Vector irradiance from a polygon of radiosity one, in a texel's axes: coefficients of 1, v, normal, u.
+pub fn vector_of_unit_radiosity(moments: &Moments, axes: &[DVec3; 3]) -> [f64; 4] {
+    ohlsh_from_moments(&moments.in_frame(axes)).map(|x| x / PI)
 }
 
 #[cfg(test)]

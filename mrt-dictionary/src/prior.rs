@@ -39,7 +39,7 @@ pub fn prior_lights(shape: &Shape, per_axis: usize) -> Vec<DVec3> {
             DVec3::new((x + 1) as f64, (y + 1) as f64, (z + 1) as f64) * step
         })
         .collect();
-    let cells = std::iter::once(DVec3::ZERO).chain(shape.openings.iter().map(|o| o.outward()));
+    let cells = std::iter::once(DVec3::ZERO).chain(shape.openings.iter().map(|o| o.face.outward()));
     cells
         .flat_map(|cell| lattice.iter().map(move |&p| p + cell))
         .collect()
@@ -47,15 +47,33 @@ pub fn prior_lights(shape: &Shape, per_axis: usize) -> Vec<DVec3> {
 
 /// The samples `L_d`: direct irradiance, texels x lights, from lights of unit intensity.
 ///
-/// Every texel sees every light: the cube is convex, and the segment to a light in the cell beyond an
-/// opening crosses that opening.
+/// Every texel sees every light inside: the cube is convex. A light in the cell beyond an opening is seen
+/// through it, and from a missing face wholly. Texels in holes stay dark.
 pub fn direct_samples(shape: &Shape, resolution: usize, config: &PriorConfig) -> Matrix<f64> {
     let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
     let lights = prior_lights(shape, config.lights_per_axis);
     Matrix::from_fn(texels.len(), lights.len(), |texel, light| {
         let (face, point) = texels[texel];
+        if shape.is_in_hole(face, point) || !is_seen(shape, point, lights[light]) {
+            return 0.0;
+        }
         sphere_light_irradiance(lights[light] - point, -face.outward(), config.light_radius)
     })
+}
+
+/// True if no wall is between a texel and a light in the shape or in the cell beyond an opening.
+fn is_seen(shape: &Shape, point: DVec3, light: DVec3) -> bool {
+    let outside = |face: Face| {
+        let along = light[face.axis()];
+        if face.is_positive() { along > 1.0 } else { along < 0.0 }
+    };
+    let Some(face) = Face::ALL.into_iter().find(|&face| outside(face)) else {
+        return true;
+    };
+    let plane = if face.is_positive() { 1.0 } else { 0.0 };
+    let t = (plane - point[face.axis()]) / (light[face.axis()] - point[face.axis()]);
+    let at = point + (light - point) * t;
+    shape.is_open(face) || shape.is_in_hole(face, at)
 }
 
 /// Decomposes the samples and keeps the `k_d` largest vectors.
@@ -80,12 +98,11 @@ pub fn enriched_prior(
     classes: &ParityClasses,
     config: &Enrichment,
 ) -> LightPrior {
-    let per_wall = classes.point_count() / (6 - shape.openings.len());
-    let constants = Matrix::from_fn(
-        classes.point_count(),
-        6 - shape.openings.len(),
-        |texel, wall| f64::from(u8::from(texel / per_wall == wall)),
-    );
+    let walls = shape.wall_count();
+    let per_wall = classes.point_count() / walls.max(1);
+    let constants = Matrix::from_fn(classes.point_count(), walls, |texel, wall| {
+        f64::from(u8::from(texel / per_wall == wall))
+    });
     let uniform = Matrix::from_fn(classes.point_count(), 1, |_, _| 1.0);
     let parts: Vec<(f64, Vec<Matrix<f64>>)> = vec![
         (1.0, prior.basis.classes.clone()),

@@ -44,6 +44,24 @@ pub fn texel_parity_classes(shape: &Shape, resolution: usize) -> ParityClasses {
 /// Parity classes of the shape's texels followed by the samples of its probes: for each of `probes`³ probes
 /// the values in [`DIRECTIONS`].
 pub fn output_parity_classes(shape: &Shape, resolution: usize, probes: usize) -> ParityClasses {
+    let permutations: Vec<Vec<u32>> = mirrors(shape)
+        .into_iter()
+        .map(|map| output_permutation(shape, resolution, probes, map))
+        .collect();
+    let count = shape.texel_count(resolution) + probes * probes * probes * DIRECTIONS.len();
+    ParityClasses::new(count, &permutations)
+}
+
+/// Where a symmetry of the shape takes its texels and the samples of its probes.
+///
+/// # Panics
+/// If the symmetry does not keep the shape.
+pub fn output_permutation(
+    shape: &Shape,
+    resolution: usize,
+    probes: usize,
+    map: CubeSymmetry,
+) -> Vec<u32> {
     // Texel and probe centres are odd multiples of half a step: exact as integers.
     let texel = |face: Face, p: DVec3| (Some(face), scaled(p, resolution), IVec3::ZERO);
     let probe = |p: DVec3, direction: IVec3| (None, scaled(p, probes), direction);
@@ -57,20 +75,14 @@ pub fn output_parity_classes(shape: &Shape, resolution: usize, probes: usize) ->
         .chain(samples.iter().map(|&(p, d)| probe(p, d)))
         .zip(0..)
         .collect();
-    let permutations: Vec<Vec<u32>> = mirrors(shape)
-        .into_iter()
-        .map(|map| {
-            let texels = texels
-                .iter()
-                .map(|&(face, p)| texel(map.face(face), map.point(p)));
-            let samples = samples.iter().map(|&(p, d)| {
-                let d = map.direction(d.as_dvec3()).as_ivec3();
-                probe(map.point(p), d)
-            });
-            texels.chain(samples).map(|key| index[&key]).collect()
-        })
-        .collect();
-    ParityClasses::new(texels.len() + samples.len(), &permutations)
+    let texels = texels
+        .iter()
+        .map(|&(face, p)| texel(map.face(face), map.point(p)));
+    let samples = samples.iter().map(|&(p, d)| {
+        let d = map.direction(d.as_dvec3()).as_ivec3();
+        probe(map.point(p), d)
+    });
+    texels.chain(samples).map(|key| index[&key]).collect()
 }
 
 fn scaled(point: DVec3, steps: usize) -> IVec3 {

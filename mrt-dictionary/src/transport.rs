@@ -5,6 +5,9 @@
 //! coefficients. For the last we depart from the paper's `V_mᵀ S⁻¹ Pᵀ` and take `S_m⁻¹ U_mᵀ F`: it has
 //! the same size, is the orthogonal projection of the true indirect light on the basis whatever the direct
 //! light, and needs no inverse of S, whose condition reaches 1e11.
+//!
+//! Below F the outputs that a level wants besides are stacked: light at probes, and light on the walls beyond the
+//! openings. Coefficients chosen for the block's own walls alone err about twice as much on those.
 
 use crate::prior::ScaledBasis;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
@@ -32,25 +35,33 @@ pub struct BlockTransport {
 
 /// F in the coordinates of each parity class; F respects the mirrors, so nothing is lost.
 pub fn fold_bounce(bounce: &Matrix<f64>, classes: &ParityClasses) -> Vec<Matrix<f64>> {
-    (0..classes.class_count())
+    fold_operator(bounce, classes, classes)
+}
+
+/// An operator that respects the mirrors, from signals on one point set to signals on another, in the coordinates
+/// of each parity class.
+pub fn fold_operator(
+    operator: &Matrix<f64>,
+    outputs: &ParityClasses,
+    inputs: &ParityClasses,
+) -> Vec<Matrix<f64>> {
+    (0..inputs.class_count())
         .map(|class| {
-            let columns: Vec<Vec<f64>> = (0..classes.dimension(class))
+            let columns: Vec<Vec<f64>> = (0..inputs.dimension(class))
                 .map(|k| {
-                    let mut unit = vec![0.0; classes.dimension(class)];
+                    let mut unit = vec![0.0; inputs.dimension(class)];
                     unit[k] = 1.0;
-                    let signal = classes.unfold(class, &unit);
-                    let signal = Matrix::from_column_major(signal.len(), 1, signal);
-                    let image = multiply_sparse(bounce, signal.column(0));
-                    classes.fold(class, &image)
+                    let image = multiply_sparse(operator, &inputs.unfold(class, &unit));
+                    outputs.fold(class, &image)
                 })
                 .collect();
-            Matrix::from_columns(classes.dimension(class), &columns)
+            Matrix::from_columns(outputs.dimension(class), &columns)
         })
         .collect()
 }
 
 /// Product with a vector that is zero nearly everywhere.
-fn multiply_sparse(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
+pub(crate) fn multiply_sparse(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
     let mut out = vec![0.0; a.rows()];
     for (j, &weight) in x.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
         for (o, &value) in out.iter_mut().zip(a.column(j)) {
@@ -62,16 +73,21 @@ fn multiply_sparse(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
 
 /// Computes the operators from a prior, keeping at most `modes` modes (fewer where a multiplet would be
 /// cut).
+///
+/// `folded_outputs` is everything that radiosity does and that coefficients must be good for, by class: the
+/// bounce itself, and where a level asks for more the light at probes and beyond openings, stacked below it.
+/// Coefficients are then the orthogonal projection of all of them.
 pub fn block_transport(
+    folded_outputs: &[Matrix<f64>],
     folded_bounce: &[Matrix<f64>],
     prior: &ScaledBasis,
     classes: &ParityClasses,
     modes: usize,
 ) -> BlockTransport {
-    let parts: Vec<_> = folded_bounce
+    let parts: Vec<_> = folded_outputs
         .iter()
         .zip(&prior.classes)
-        .map(|(bounce, basis)| svd(multiply(bounce.view(), basis.view()).view()))
+        .map(|(outputs, basis)| svd(multiply(outputs.view(), basis.view()).view()))
         .collect();
     let mut order: Vec<(usize, usize)> = (0..parts.len())
         .flat_map(|class| (0..parts[class].singular_values.len()).map(move |k| (class, k)))
@@ -87,13 +103,12 @@ pub fn block_transport(
     for &(class, k) in &order[..kept] {
         let part = &parts[class];
         let sigma = part.singular_values[k];
-        let u = part.u.column(k);
-        let scaled: Vec<f64> = u.iter().map(|x| x * sigma).collect();
-        indirect_columns.push(classes.unfold(class, &scaled));
         let v = part.v.columns_view(k..k + 1);
         let implicit = multiply(prior.classes[class].view(), v);
         implicit_columns.push(classes.unfold(class, implicit.data()));
-        let row = transpose_multiply(folded_bounce[class].view(), part.u.columns_view(k..k + 1));
+        let indirect = multiply(folded_bounce[class].view(), implicit.view());
+        indirect_columns.push(classes.unfold(class, indirect.data()));
+        let row = transpose_multiply(folded_outputs[class].view(), part.u.columns_view(k..k + 1));
         let row: Vec<f64> = row.data().iter().map(|x| x / sigma).collect();
         coefficient_rows.push(classes.unfold(class, &row));
     }
