@@ -15,3 +15,5 @@ pub mod lightfield;
 pub mod interface;
 pub mod bake;
 pub mod spectrum;
+pub mod warped_symmetry;
+pub mod warped_bounce;
