@@ -3,6 +3,9 @@
 //! For each canonical shape: the [`symmetry`] of its texels, the closed-form one-[`bounce`] operator, a
 //! light [`prior`], and the reduced [`transport`]. For all together: [`lightfield`]s at the openings and the
 //! [`interface`] operators between them. [`bake`] is that list of calls.
+//!
+//! For a block that is warped too far for the canonical operators: its own [`warped_symmetry`],
+//! [`warped_bounce`], [`warped_prior`] and [`warped`] transport, and the [`warp_error`] to decide by.
 
 pub mod config;
 pub mod progress;
@@ -21,3 +24,9 @@ pub mod lightfield;
 pub mod interface;
 pub mod bake;
 pub mod spectrum;
+pub mod warped_symmetry;
+pub mod warped_bounce;
+pub mod warped_prior;
+mod snapshots;
+pub mod warped;
+pub mod warp_error;
