@@ -21,3 +21,4 @@ pub mod sampling;
 pub mod sh;
 #[cfg(feature = "svd")]
 pub mod svd;
+pub mod tube;
