@@ -19,7 +19,7 @@
 mod quartic;
 
 use crate::cube::Face;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use quartic::Quartic;
 use std::f64::consts::FRAC_PI_2;
 
@@ -89,6 +89,19 @@ impl TubeForm {
         match self {
             TubeForm::Straight => [Face::NegY, Face::PosY, Face::NegZ, Face::PosZ],
             TubeForm::Bend => [Face::NegX, Face::NegY, Face::PosY, Face::NegZ],
+        }
+    }
+
+    /// The point at `along` in [0, 1], from -x to +x or from +z to +x, and (across, up) from the centre line;
+    /// across is +z in the straight tube, away from the edge x = 1, z = 1 in the bend.
+    pub fn point(self, along: f64, section: DVec2) -> DVec3 {
+        match self {
+            TubeForm::Straight => DVec3::new(along, 0.5 + section.y, 0.5 + section.x),
+            TubeForm::Bend => {
+                let (sine, cosine) = libm::sincos(FRAC_PI_2 * along);
+                let radius = BEND_RADIUS + section.x;
+                DVec3::new(1.0 - radius * cosine, 0.5 + section.y, 1.0 - radius * sine)
+            }
         }
     }
 

@@ -68,7 +68,7 @@ proptest! {
         let depth = if on_wall { 0.0 } else { depth };
         let at = form.surface(form.charts()[chart], u, v);
         let origin = at.position + at.normal * (depth * TUBE_RADIUS);
-        let mut direction = sphere_from_square(square_from_unit(glam::DVec2::new(x, y)));
+        let mut direction = sphere_from_square(square_from_unit(DVec2::new(x, y)));
         if direction.dot(at.normal) < 0.0 && on_wall {
             direction = -direction;
         }
