@@ -15,3 +15,4 @@ pub mod lightfield;
 pub mod interface;
 pub mod bake;
 pub mod spectrum;
+pub mod tube_bounce;
