@@ -16,3 +16,4 @@ pub mod interface;
 pub mod bake;
 pub mod spectrum;
 pub mod tube_bounce;
+pub mod tube_prior;
