@@ -17,3 +17,5 @@ pub mod bake;
 pub mod spectrum;
 pub mod tube_bounce;
 pub mod tube_prior;
+pub mod tube_lightfield;
+pub mod tube_response;
