@@ -135,7 +135,7 @@ pub const NEAR_WIDTHS: f64 = 4.0;
 /// centres.
 ///
 /// Cost: 16 resolution⁴ pairs of texels, an eighth or a quarter of that by symmetry, 16 kernel evaluations
-/// each: 1 s and 3 s at 32² on two cores.
+/// each: 0.6 s (straight) and 1.4 s (bend) at 32² on two cores.
 ///
 /// # Errors
 /// [`Cancelled`], when the caller's progress says so.
