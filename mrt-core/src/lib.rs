@@ -25,3 +25,4 @@ pub mod ohlsh;
 pub mod storage;
 #[cfg(feature = "svd")]
 pub mod svd;
+pub mod tube;

@@ -30,3 +30,7 @@ pub mod warped_prior;
 mod snapshots;
 pub mod warped;
 pub mod warp_error;
+pub mod tube_bounce;
+pub mod tube_prior;
+pub mod tube_lightfield;
+pub mod tube_response;

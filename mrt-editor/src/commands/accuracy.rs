@@ -3,7 +3,7 @@
 use crate::dictionary_source::{SourceError, load};
 use crate::table::Table;
 use glam::Vec3;
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::{Bounces, Frame, FrameError};
 use mrt_runtime::level::{CellsError, Level};
@@ -37,9 +37,30 @@ pub struct AccuracyArgs {
     /// Openings that light may cross, at most.
     #[arg(long, default_value_t = AssembleConfig::default().max_depth)]
     pub max_depth: usize,
+    /// How light is taken from block to block.
+    #[arg(long, value_enum, default_value = "table")]
+    pub coupling: CouplingArg,
     /// Print one JSON object a line: scene, light, term, preset, rel_l2, rel_l2_by_hop.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How light is taken from block to block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum CouplingArg {
+    /// By the operator of each whole path of openings.
+    Table,
+    /// By lightfields passed on from opening to opening, as in the paper.
+    Lightfield,
+}
+
+impl From<CouplingArg> for Coupling {
+    fn from(arg: CouplingArg) -> Self {
+        match arg {
+            CouplingArg::Table => Coupling::Table,
+            CouplingArg::Lightfield => Coupling::Lightfield,
+        }
+    }
 }
 
 /// Which bounces a comparison covers.
@@ -203,6 +224,7 @@ pub fn compare(
     });
     let level = level(reference, albedo)?;
     let config = AssembleConfig {
+        coupling: args.coupling.into(),
         max_depth: args.max_depth,
         ..AssembleConfig::default()
     };

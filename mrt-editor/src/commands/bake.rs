@@ -1,5 +1,6 @@
 //! `mrt bake`: computes a dictionary.
 
+use crate::commands::info::CouplingReport;
 use crate::dictionary_source::{DEFAULT_PRESET, bake_with_progress};
 use crate::table::Table;
 use mrt_core::container::{ContainerError, write_file_atomically};
@@ -14,9 +15,10 @@ use std::time::Instant;
 /// Bakes a dictionary of canonical shapes; the same settings give the same bytes.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BakeArgs {
-    /// Which shapes.
-    #[arg(long, value_enum, default_value = "cubes-2d")]
-    pub set: ShapeSet,
+    /// Shapes to bake: cubes-2d (cubes with side faces missing), cubes-3d (all cubes with faces missing) or
+    /// rooms (cubes-2d, with doors and windows).
+    #[arg(long, default_value = "cubes-2d")]
+    pub set: String,
     /// Quality and size: mobile, standard or quality.
     #[arg(long, default_value = DEFAULT_PRESET)]
     pub preset: String,
@@ -35,6 +37,21 @@ pub struct BakeArgs {
     /// Modes of the walls' response to light through an opening, at most [default: the preset's].
     #[arg(long)]
     pub response_modes: Option<usize>,
+    /// Emission modes, at most.
+    #[arg(long)]
+    pub emission_modes: Option<usize>,
+    /// Modes that light from other blocks adds to each shape's own, at most.
+    #[arg(long)]
+    pub foreign_modes: Option<usize>,
+    /// Openings that a path of the table crosses, at most.
+    #[arg(long)]
+    pub path_depth: Option<usize>,
+    /// Probes along an edge of a block; 0 for none.
+    #[arg(long)]
+    pub probes: Option<usize>,
+    /// Also bake vector irradiance, for normal maps.
+    #[arg(long)]
+    pub vector: bool,
     /// Lights of the prior along each axis [default: the preset's].
     #[arg(long)]
     pub lights_per_axis: Option<usize>,
@@ -44,14 +61,6 @@ pub struct BakeArgs {
     /// Print the report as one JSON object.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Families of shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ShapeSet {
-    /// Cubes with 0 to 4 of their side faces missing: six shapes, twelve openings.
-    #[value(name = "cubes-2d")]
-    Cubes2d,
 }
 
 /// Why nothing was baked.
@@ -95,10 +104,8 @@ struct BakeReport {
     settings: String,
     seconds: f64,
     file_bytes: usize,
-    lightfield_modes: usize,
-    lightfield_dropped_energy: f32,
-    response_modes: usize,
-    response_dropped_energy: f32,
+    #[serde(flatten)]
+    coupling: CouplingReport,
     shapes: Vec<ShapeReport>,
 }
 
@@ -107,7 +114,9 @@ struct ShapeReport {
     shape: &'static str,
     texels: usize,
     modes: usize,
+    joint_modes: usize,
     dropped_energy: f32,
+    joint_dropped_energy: f32,
     bytes: usize,
 }
 
@@ -165,10 +174,14 @@ fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
             args.lightfield_modes,
             &mut config.lightfield.lightfield_modes,
         ),
-        (args.response_modes, &mut config.lightfield.response_modes),
+        (args.response_modes, &mut config.coupling.response_modes),
+        (args.emission_modes, &mut config.coupling.emission_modes),
+        (args.foreign_modes, &mut config.coupling.foreign_modes),
+        (args.path_depth, &mut config.coupling.depth),
+        (args.probes, &mut config.outputs.probes),
         (args.lights_per_axis, &mut config.prior.lights_per_axis),
     ];
-    let mut changed = args.enrichment.is_some();
+    let mut changed = args.enrichment.is_some() || args.vector;
     for (given, setting) in overrides {
         if let Some(value) = given {
             *setting = value;
@@ -185,6 +198,8 @@ fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
         }
         None => {}
     }
+    config.shapes = args.set.clone();
+    config.outputs.vector |= args.vector;
     if changed {
         config.preset = format!("{} (changed)", args.preset);
     }
@@ -199,18 +214,17 @@ fn report(args: &BakeArgs, dictionary: &Dictionary, file_bytes: usize, seconds: 
         settings: dictionary.settings.clone(),
         seconds,
         file_bytes,
-        lightfield_modes: dictionary.interface.straight.rows(),
-        lightfield_dropped_energy: dictionary.interface.lightfield_dropped_energy,
-        response_modes: dictionary.interface.response_basis.columns(),
-        response_dropped_energy: dictionary.interface.response_dropped_energy,
+        coupling: CouplingReport::of(dictionary),
         shapes: dictionary
             .shapes
             .iter()
             .map(|entry| ShapeReport {
                 shape: entry.shape.name,
-                texels: entry.indirect_basis.rows(),
+                texels: entry.joint_basis.rows(),
                 modes: entry.modes(),
+                joint_modes: entry.joint_modes(),
                 dropped_energy: entry.dropped_energy,
+                joint_dropped_energy: entry.joint_dropped_energy,
                 bytes: entry.bytes(),
             })
             .collect(),
@@ -219,24 +233,28 @@ fn report(args: &BakeArgs, dictionary: &Dictionary, file_bytes: usize, seconds: 
 
 fn print(report: &BakeReport) {
     crate::report_line!("{}: {}", report.preset, report.settings);
-    let mut table = Table::new(&["shape", "texels", "modes", "energy dropped", "bytes"]);
+    let mut table = Table::new(&[
+        "shape",
+        "texels",
+        "modes",
+        "energy dropped",
+        "joint modes",
+        "foreign dropped",
+        "bytes",
+    ]);
     for shape in &report.shapes {
         table.row([
             shape.shape.to_owned(),
             shape.texels.to_string(),
             shape.modes.to_string(),
             format!("{:.2e}", shape.dropped_energy),
+            shape.joint_modes.to_string(),
+            format!("{:.2e}", shape.joint_dropped_energy),
             shape.bytes.to_string(),
         ]);
     }
     crate::report!("{table}");
-    crate::report_line!(
-        "openings: {} lightfield modes (energy dropped {:.2e}), {} response modes ({:.2e})",
-        report.lightfield_modes,
-        report.lightfield_dropped_energy,
-        report.response_modes,
-        report.response_dropped_energy
-    );
+    report.coupling.print();
     crate::report_line!(
         "{}: {} bytes in {:.1} s",
         report.file,

@@ -43,13 +43,52 @@ struct Info<'a> {
     settings: &'a str,
     resolution: usize,
     bytes: usize,
-    lightfield_modes: usize,
-    lightfield_dropped_energy: f32,
-    response_modes: usize,
-    response_dropped_energy: f32,
+    #[serde(flatten)]
+    coupling: CouplingReport,
     shapes: Vec<ShapeInfo>,
     #[serde(skip_serializing_if = "Option::is_none")]
     spectra: Option<Vec<SpectrumInfo>>,
+}
+
+/// How light gets from block to block.
+#[derive(Serialize)]
+pub(super) struct CouplingReport {
+    lightfield_modes: usize,
+    lightfield_dropped_energy: f32,
+    emission_modes: usize,
+    emission_dropped_energy: f32,
+    response_modes: usize,
+    response_dropped_energy: f32,
+    paths: usize,
+}
+
+impl CouplingReport {
+    pub(super) fn of(dictionary: &Dictionary) -> Self {
+        let (fields, paths) = (&dictionary.lightfields, &dictionary.paths);
+        Self {
+            lightfield_modes: fields.parity.len(),
+            lightfield_dropped_energy: fields.dropped_energy,
+            emission_modes: paths.emission_parity.len(),
+            emission_dropped_energy: paths.emission_dropped_energy,
+            response_modes: paths.response_parity.len(),
+            response_dropped_energy: paths.response_dropped_energy,
+            paths: paths.entries.len(),
+        }
+    }
+
+    pub(super) fn print(&self) {
+        crate::report_line!(
+            "between blocks: {} paths from {} emission modes (energy dropped {:.2e}) to {} response modes \
+             ({:.2e}); {} lightfield modes ({:.2e})",
+            self.paths,
+            self.emission_modes,
+            self.emission_dropped_energy,
+            self.response_modes,
+            self.response_dropped_energy,
+            self.lightfield_modes,
+            self.lightfield_dropped_energy,
+        );
+    }
 }
 
 #[derive(Serialize)]
@@ -58,6 +97,7 @@ struct ShapeInfo {
     openings: Vec<&'static str>,
     texels: usize,
     modes: usize,
+    joint_modes: usize,
     dropped_energy: f32,
     largest_singular_value: f32,
     smallest_singular_value: f32,
@@ -110,17 +150,13 @@ fn info<'a>(
     dictionary: &'a Dictionary,
     spectra: Option<Vec<SpectrumInfo>>,
 ) -> Info<'a> {
-    let interface = &dictionary.interface;
     Info {
         file: args.file.display().to_string(),
         preset: &dictionary.preset,
         settings: &dictionary.settings,
         resolution: dictionary.resolution,
         bytes: dictionary.bytes(),
-        lightfield_modes: interface.straight.rows(),
-        lightfield_dropped_energy: interface.lightfield_dropped_energy,
-        response_modes: interface.response_basis.columns(),
-        response_dropped_energy: interface.response_dropped_energy,
+        coupling: CouplingReport::of(dictionary),
         shapes: dictionary
             .shapes
             .iter()
@@ -130,9 +166,10 @@ fn info<'a>(
                     .shape
                     .openings
                     .iter()
-                    .map(|face| face.name())
+                    .map(|opening| opening.face.name())
                     .collect(),
-                texels: entry.indirect_basis.rows(),
+                texels: entry.joint_basis.rows(),
+                joint_modes: entry.joint_modes(),
                 modes: entry.modes(),
                 dropped_energy: entry.dropped_energy,
                 largest_singular_value: entry.singular_values.first().copied().unwrap_or(0.0),
@@ -152,6 +189,7 @@ fn print(info: &Info) {
         "openings",
         "texels",
         "modes",
+        "joint modes",
         "singular values",
         "energy dropped",
         "bytes",
@@ -162,6 +200,7 @@ fn print(info: &Info) {
             shape.openings.join(" "),
             shape.texels.to_string(),
             shape.modes.to_string(),
+            shape.joint_modes.to_string(),
             format!(
                 "{:.3} .. {:.2e}",
                 shape.largest_singular_value, shape.smallest_singular_value
@@ -171,13 +210,7 @@ fn print(info: &Info) {
         ]);
     }
     crate::report!("{table}");
-    crate::report_line!(
-        "openings: {} lightfield modes (energy dropped {:.2e}), {} response modes ({:.2e})",
-        info.lightfield_modes,
-        info.lightfield_dropped_energy,
-        info.response_modes,
-        info.response_dropped_energy
-    );
+    info.coupling.print();
     crate::report_line!("{} bytes of matrices", info.bytes);
     if let Some(spectra) = &info.spectra {
         crate::report_line!("\nsingular values that hold a share of the energy, closed cube:");

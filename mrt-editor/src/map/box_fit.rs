@@ -43,5 +43,6 @@ pub fn fit_box(shape: &'static Shape, points: &[Vec3]) -> Level {
             Vec3::splat(0.5),
         )],
         connections: Vec::new(),
+        doors: Vec::new(),
     }
 }

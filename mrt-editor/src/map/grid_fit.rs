@@ -276,6 +276,7 @@ fn assemble_level(cells: &[Cell], kept: &[usize], open: &[Passage], warps: &[Hex
     Level {
         blocks,
         connections,
+        doors: Vec::new(),
     }
 }
 
