@@ -16,7 +16,8 @@ use crate::response::{ResponseBasis, response_basis, rows, stack};
 use crate::shape_transport::{ShapeTransport, neighbours, shape_transport};
 use mrt_core::matrix::{Matrix, multiply};
 use mrt_runtime::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
+    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
+    Sources,
 };
 use mrt_runtime::path::Word;
 use mrt_runtime::shape::{Hole, Outline, Shape, shape_set};
@@ -48,7 +49,11 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
     let emission = emission(&shapes, &transports, config, &set);
     let words = Word::all(
         config.coupling.depth,
-        if set.holes.is_empty() { 0 } else { config.coupling.hole_depth },
+        if set.holes.is_empty() {
+            0
+        } else {
+            config.coupling.hole_depth
+        },
         &set.holes,
         set.has_exchanges,
     );
@@ -68,7 +73,9 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
     let mut entries = Vec::with_capacity(shapes.len());
     for (shape, transport) in shapes.iter().zip(&transports) {
         step(shape.name)?;
-        entries.push(pack_shape(shape, transport, &emission, &response, config, &set));
+        entries.push(pack_shape(
+            shape, transport, &emission, &response, config, &set,
+        ));
     }
     step("lightfields at the openings")?;
     let grid = LightfieldGrid::new(&config.lightfield);
@@ -102,6 +109,7 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
         resolution: config.resolution,
         probes: config.outputs.probes,
         shapes: entries,
+        variants: Vec::new(),
         lightfields: pack_lightfields(&basis, &interface),
         sources: Some(pack_sources(&emission, &response, config.resolution)),
         paths: pack_paths(words, &emission, response),
@@ -130,12 +138,20 @@ impl Set {
                 .chain(holes.iter().map(|&hole| Outline::Hole(hole)))
                 .collect(),
             // Words and masks are indexed by position in `Hole::ALL`.
-            holes: if holes.is_empty() { holes } else { Hole::ALL.to_vec() },
+            holes: if holes.is_empty() {
+                holes
+            } else {
+                Hole::ALL.to_vec()
+            },
         }
     }
 
     fn exchanges(&self) -> &'static [bool] {
-        if self.has_exchanges { &[false, true] } else { &[false] }
+        if self.has_exchanges {
+            &[false, true]
+        } else {
+            &[false]
+        }
     }
 }
 
@@ -209,13 +225,8 @@ fn pack_shape(
                 .exchanges()
                 .iter()
                 .map(|&is_exchanged| {
-                    let sent = emitter_radiosity(
-                        shape,
-                        opening.face,
-                        is_exchanged,
-                        radiosity,
-                        resolution,
-                    );
+                    let sent =
+                        emitter_radiosity(shape, opening.face, is_exchanged, radiosity, resolution);
                     multiply(emission.from_radiosity.view(), sent.view()).cast()
                 })
                 .collect(),

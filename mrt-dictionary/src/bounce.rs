@@ -105,12 +105,7 @@ fn cut_holes(bounce: &mut Matrix<f64>, shape: &Shape, resolution: usize) {
 }
 
 /// The part of a texel that is in the hole of its wall.
-fn missing_part(
-    shape: &Shape,
-    face: Face,
-    center: DVec3,
-    resolution: usize,
-) -> Option<[DVec3; 4]> {
+fn missing_part(shape: &Shape, face: Face, center: DVec3, resolution: usize) -> Option<[DVec3; 4]> {
     let Outline::Hole(hole) = shape.opening(face)?.outline else {
         return None;
     };

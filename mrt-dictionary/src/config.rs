@@ -147,7 +147,8 @@ impl BakeConfig {
     /// # Errors
     /// [`ConfigError::UnknownPreset`].
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
-        let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name {
+        let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name
+        {
             "mobile" => (6, 12, 64, [32, 24, 6], 3),
             "standard" => (16, 32, 128, [96, 64, 16], 5),
             "quality" => (16, 96, 192, [160, 128, 32], 5),
@@ -262,12 +263,7 @@ impl BakeConfig {
                 MAX_PATH_DEPTH,
             ),
             ("beyond weight", self.coupling.beyond_weight, 0.0, 1000.0),
-            (
-                "probes along an edge",
-                self.outputs.probes as f64,
-                0.0,
-                8.0,
-            ),
+            ("probes along an edge", self.outputs.probes as f64, 0.0, 8.0),
             (
                 "lightfield samples times modes",
                 (lightfield.positions * lightfield.directions).pow(2) as f64
@@ -339,7 +335,11 @@ impl BakeConfig {
             coupling.foreign_modes,
             coupling.beyond_weight,
             self.outputs.probes,
-            if self.outputs.vector { ", vector irradiance" } else { "" },
+            if self.outputs.vector {
+                ", vector irradiance"
+            } else {
+                ""
+            },
         )
     }
 }

@@ -6,10 +6,10 @@
 
 use crate::config::LightfieldConfig;
 use crate::lightfield::{LightfieldGrid, frame_of_heading};
-use crate::prior::root_sum_of_squares;
-use crate::progress::{Cancelled, Progress};
 use crate::outputs::{PROBE_WEIGHT, ProbeSamples, SH9, probe_points, sh_of_unit_radiosity};
 use crate::path_transport::{EMITTER, RECEIVER};
+use crate::prior::root_sum_of_squares;
+use crate::progress::{Cancelled, Progress};
 use crate::response::{ResponseBasis, stack};
 use crate::transport::whole_multiplets;
 use glam::{DVec2, DVec3};
@@ -297,7 +297,7 @@ pub fn interface_operators(
     setup: &InterfaceSetup,
     progress: &Progress,
 ) -> Result<InterfaceOperators, Cancelled> {
-    let project = |m: &Matrix<f64>| parallel_transpose_multiply(&basis.vectors, m);
+    let project = |m: &Matrix<f64>| lightfield_coefficients(basis, m);
     let straight = project(&propagated(grid, &basis.vectors, Exit::Straight));
     progress.check()?;
     let left = project(&propagated(grid, &basis.vectors, Exit::Left));
@@ -346,7 +346,9 @@ pub fn exchanged(grid: &LightfieldGrid, fields: &Matrix<f64>) -> Matrix<f64> {
         let (i, j) = (rest % p, rest / p);
         ((i * p + j) * d + x) * d + y
     };
-    Matrix::from_fn(fields.rows(), fields.columns(), |s, k| fields[(source(s), k)])
+    Matrix::from_fn(fields.rows(), fields.columns(), |s, k| {
+        fields[(source(s), k)]
+    })
 }
 
 /// What a hole lets through: each position counts with the fraction of its cell in the hole.
@@ -363,6 +365,11 @@ fn masked(grid: &LightfieldGrid, fields: &Matrix<f64>, hole: Hole) -> Matrix<f64
     Matrix::from_fn(fields.rows(), fields.columns(), |s, k| {
         fraction(s) * fields[(s, k)]
     })
+}
+
+/// Coefficients of lightfields (flux-weighted, samples x signals) in the basis.
+pub fn lightfield_coefficients(basis: &LightfieldBasis, fields: &Matrix<f64>) -> Matrix<f64> {
+    parallel_transpose_multiply(&basis.vectors, fields)
 }
 
 fn parallel_transpose_multiply(a: &Matrix<f64>, b: &Matrix<f64>) -> Matrix<f64> {
@@ -425,7 +432,10 @@ fn response_of_modes(
     let volume = Matrix::from_fn(SH9 * points.len(), modes, |i, j| {
         volume[i / SH9][i % SH9 * modes + j]
     });
-    stack(&walls, &ProbeSamples::default().from_sh(&volume, PROBE_WEIGHT))
+    stack(
+        &walls,
+        &ProbeSamples::default().from_sh(&volume, PROBE_WEIGHT),
+    )
 }
 
 /// A square part of the interface as a point behind it sees it.

@@ -13,10 +13,10 @@ use crate::symmetry::output_parity_classes;
 use crate::transport::whole_multiplets;
 use glam::{DVec3, IVec3};
 use mrt_core::cube::Face;
+use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::svd::{largest_entry_sign, symmetric_eigen};
 use mrt_runtime::path::frame_of_heading;
-use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_runtime::shape::Shape;
 
 /// Light of a shape's own modes.
@@ -62,18 +62,40 @@ pub fn joint_basis(
     // The coefficients of U_b's columns whose sum is nearest to a signal.
     let base_gram = transpose_multiply(base.view(), base.view());
     let nearest = multiply(pseudo_inverse(&base_gram).view(), base.transposed().view());
-    let exchanges: &[bool] = if has_exchanges { &[false, true] } else { &[false] };
+    let exchanges: &[bool] = if has_exchanges {
+        &[false, true]
+    } else {
+        &[false]
+    };
     let mut responses = Vec::new();
     for opening in shape.openings {
         for &is_exchanged in exchanges {
-            let (field, vector) =
-                response_at(shape, opening.face, is_exchanged, response, resolution, probes);
+            let (field, vector) = response_at(
+                shape,
+                opening.face,
+                is_exchanged,
+                response,
+                resolution,
+                probes,
+            );
             let of_base = multiply(nearest.view(), field.view());
             let rest = difference(&field, &multiply(base.view(), of_base.view()));
-            responses.push(Response { field, vector, of_base, rest });
+            responses.push(Response {
+                field,
+                vector,
+                of_base,
+                rest,
+            });
         }
     }
-    let found = extra_modes(shape, &responses, &response.scales, resolution, probes, extra);
+    let found = extra_modes(
+        shape,
+        &responses,
+        &response.scales,
+        resolution,
+        probes,
+        extra,
+    );
     let (mut irradiance, mut vector) = (own.irradiance.clone(), own.vector.clone());
     let mut probe_samples = rows(&base, texels..base.rows());
     for weights in &found.weights {
@@ -156,11 +178,7 @@ fn response_at(
             walls + probe_index(p, probes) * DIRECTIONS.len() + direction.unwrap_or(0)
         })
     });
-    let sources: Vec<Option<usize>> = texels
-        .iter()
-        .copied()
-        .chain(samples.map(Some))
-        .collect();
+    let sources: Vec<Option<usize>> = texels.iter().copied().chain(samples.map(Some)).collect();
     let field = Matrix::from_fn(sources.len(), response.basis.columns(), |i, j| {
         sources[i].map_or(0.0, |row| response.basis[(row, j)])
     });
@@ -210,7 +228,11 @@ impl Extra {
         };
         let all: f64 = responses.iter().map(|r| energy(&r.field)).sum();
         let rest: f64 = responses.iter().map(|r| energy(&r.rest)).sum();
-        if all > 0.0 { (rest - self.kept_energy).max(0.0) / all } else { 0.0 }
+        if all > 0.0 {
+            (rest - self.kept_energy).max(0.0) / all
+        } else {
+            0.0
+        }
     }
 }
 
@@ -224,7 +246,10 @@ fn extra_modes(
     extra: usize,
 ) -> Extra {
     if responses.is_empty() || extra == 0 {
-        return Extra { weights: Vec::new(), kept_energy: 0.0 };
+        return Extra {
+            weights: Vec::new(),
+            kept_energy: 0.0,
+        };
     }
     let classes = output_parity_classes(shape, resolution, probes);
     let columns: Vec<(usize, usize)> = (0..responses.len())
@@ -271,10 +296,7 @@ fn extra_modes(
 }
 
 /// Sum of all columns of several matrices with weights.
-fn combine<'a>(
-    parts: impl Iterator<Item = &'a Matrix<f64>>,
-    weights: &[f64],
-) -> Matrix<f64> {
+fn combine<'a>(parts: impl Iterator<Item = &'a Matrix<f64>>, weights: &[f64]) -> Matrix<f64> {
     let mut sum: Option<Matrix<f64>> = None;
     let mut next = 0;
     for part in parts {

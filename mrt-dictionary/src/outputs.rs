@@ -54,7 +54,11 @@ fn lebedev_weight(direction: IVec3) -> f64 {
 pub fn probe_points(per_axis: usize) -> impl Iterator<Item = DVec3> {
     let center = move |k: usize| (k as f64 + 0.5) / per_axis as f64;
     (0..per_axis * per_axis * per_axis).map(move |k| {
-        let (x, y, z) = (k % per_axis, k / per_axis % per_axis, k / per_axis / per_axis);
+        let (x, y, z) = (
+            k % per_axis,
+            k / per_axis % per_axis,
+            k / per_axis / per_axis,
+        );
         DVec3::new(center(x), center(y), center(z))
     })
 }
@@ -210,7 +214,9 @@ mod tests {
     #[test]
     fn samples_keep_norms_and_lead_back() {
         let samples = ProbeSamples::default();
-        let sh = Matrix::from_fn(2 * SH9, 3, |i, j| f64::from((7 * i + 3 * j) as u32 % 11) - 5.0);
+        let sh = Matrix::from_fn(2 * SH9, 3, |i, j| {
+            f64::from((7 * i + 3 * j) as u32 % 11) - 5.0
+        });
         let there = samples.from_sh(&sh, 0.5);
         // Sums of 26 products.
         assert!((there.frobenius_norm() - 0.5 * sh.frobenius_norm()).abs() < 1e-12);
@@ -227,7 +233,11 @@ mod tests {
         for i in 0..operator.rows() {
             let sum: f64 = (0..operator.columns()).map(|j| operator[(i, j)]).sum();
             // Radiosity one is radiance 1/π, and the constant function integrates to 2 √π.
-            let expected = if i % SH9 == 0 { 2.0 * PI.sqrt() / PI } else { 0.0 };
+            let expected = if i % SH9 == 0 {
+                2.0 * PI.sqrt() / PI
+            } else {
+                0.0
+            };
             assert!((sum - expected).abs() < 1e-12, "row {i}: {sum}");
         }
     }

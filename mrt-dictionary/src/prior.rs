@@ -65,7 +65,11 @@ pub fn direct_samples(shape: &Shape, resolution: usize, config: &PriorConfig) ->
 fn is_seen(shape: &Shape, point: DVec3, light: DVec3) -> bool {
     let outside = |face: Face| {
         let along = light[face.axis()];
-        if face.is_positive() { along > 1.0 } else { along < 0.0 }
+        if face.is_positive() {
+            along > 1.0
+        } else {
+            along < 0.0
+        }
     };
     let Some(face) = Face::ALL.into_iter().find(|&face| outside(face)) else {
         return true;

@@ -74,7 +74,12 @@ pub fn response_basis(
         .into_par_iter()
         .map(|class| {
             progress.check()?;
-            Ok(modes_of_class(&classes, class, &scaled, exchange.as_deref()))
+            Ok(modes_of_class(
+                &classes,
+                class,
+                &scaled,
+                exchange.as_deref(),
+            ))
         })
         .collect::<Result<Vec<_>, Cancelled>>()?
         .into_iter()
@@ -106,16 +111,19 @@ pub fn response_basis(
 
 /// Texels, then weighted samples of probes.
 pub fn stacked(light: &Gathered, samples: &ProbeSamples) -> Matrix<f64> {
-    stack(&light.irradiance, &samples.from_sh(&light.probes, PROBE_WEIGHT))
+    stack(
+        &light.irradiance,
+        &samples.from_sh(&light.probes, PROBE_WEIGHT),
+    )
 }
 
 /// One matrix above another.
 pub fn stack(above: &Matrix<f64>, below: &Matrix<f64>) -> Matrix<f64> {
-    Matrix::from_fn(above.rows() + below.rows(), above.columns(), |i, j| {
-        match i.checked_sub(above.rows()) {
-            None => above[(i, j)],
-            Some(i) => below[(i, j)],
-        }
+    Matrix::from_fn(above.rows() + below.rows(), above.columns(), |i, j| match i
+        .checked_sub(above.rows())
+    {
+        None => above[(i, j)],
+        Some(i) => below[(i, j)],
     })
 }
 
@@ -158,7 +166,11 @@ fn modes_of_class(
         .map(|(k, &value)| {
             let vector = vectors.column(k);
             let sign = largest_entry_sign(vector);
-            (value.sqrt(), class, vector.iter().map(|x| sign * x).collect())
+            (
+                value.sqrt(),
+                class,
+                vector.iter().map(|x| sign * x).collect(),
+            )
         })
         .collect()
 }
@@ -194,7 +206,11 @@ fn vector_of_modes(
     // Mirrored paths occur too: only what has the mode's own parity is left, and modes of different parity do
     // not correlate.
     let own = Matrix::from_fn(parity.len(), parity.len(), |i, j| {
-        if parity[i] == parity[j] { own[(i, j)] } else { 0.0 }
+        if parity[i] == parity[j] {
+            own[(i, j)]
+        } else {
+            0.0
+        }
     });
     let cross = of_own_parity(&cross, parity, setup.resolution);
     multiply(cross.view(), pseudo_inverse(&own).view())
@@ -216,7 +232,11 @@ fn of_own_parity(vector: &Matrix<f64>, parity: &[u8], resolution: usize) -> Matr
             .collect();
         part = Matrix::from_fn(part.rows(), part.columns(), |i, j| {
             let odd = parity[j] >> axis & 1 == 1;
-            let sign = if odd { -flips[i / 4][i % 4] } else { flips[i / 4][i % 4] };
+            let sign = if odd {
+                -flips[i / 4][i % 4]
+            } else {
+                flips[i / 4][i % 4]
+            };
             let mirrored = 4 * image[i / 4] as usize + i % 4;
             0.5 * (part[(i, j)] + sign * part[(mirrored, j)])
         });
@@ -230,7 +250,16 @@ pub fn pseudo_inverse(matrix: &Matrix<f64>) -> Matrix<f64> {
     let largest = values.first().copied().unwrap_or(0.0);
     let inverse: Vec<f64> = values
         .iter()
-        .map(|&value| if value > GRAM_FLOOR * largest { 1.0 / value } else { 0.0 })
+        .map(|&value| {
+            if value > GRAM_FLOOR * largest {
+                1.0 / value
+            } else {
+                0.0
+            }
+        })
         .collect();
-    multiply(vectors.scaled_columns(&inverse).view(), vectors.transposed().view())
+    multiply(
+        vectors.scaled_columns(&inverse).view(),
+        vectors.transposed().view(),
+    )
 }

@@ -15,12 +15,12 @@ use crate::progress::Cancelled;
 use crate::response::stacked;
 use crate::symmetry::{output_parity_classes, texel_parity_classes};
 use crate::transport::{BlockTransport, block_transport, fold_bounce, fold_operator};
+use mrt_core::cube::Face;
 use mrt_core::matrix::Matrix;
 use mrt_core::parity::ParityClasses;
 use mrt_core::svd::symmetric_eigen;
 use mrt_runtime::path::{Crossing, Word, hole_of};
 use mrt_runtime::shape::{Outline, Shape};
-use mrt_core::cube::Face;
 
 /// A shape's operators: as [`BlockTransport`], with modes chosen for all outputs.
 pub type ShapeTransport = BlockTransport;
@@ -54,7 +54,10 @@ pub fn neighbours(config: &BakeConfig, outlines: &[Outline]) -> Result<Vec<Neigh
                 heading: Face::PosZ,
                 hole: hole_of(outline),
             });
-            let light = stacked(&gather(&word, Signals::EachTexel, &setup), &ProbeSamples::default());
+            let light = stacked(
+                &gather(&word, Signals::EachTexel, &setup),
+                &ProbeSamples::default(),
+            );
             Neighbour {
                 outline,
                 operator: compressed(&light, &classes),
@@ -109,9 +112,8 @@ pub fn shape_transport(
     let outputs = folded_outputs(shape, &folded, neighbours, &classes, config);
     let samples = direct_samples(shape, config.resolution, &config.prior);
     let prior = light_prior(&samples, &classes, config.prior.k_d);
-    let transport = |basis: &ScaledBasis| {
-        block_transport(&outputs, &folded, basis, &classes, config.modes)
-    };
+    let transport =
+        |basis: &ScaledBasis| block_transport(&outputs, &folded, basis, &classes, config.modes);
     let plain = transport(&prior.basis);
     match &config.enrichment {
         None => plain,
@@ -194,7 +196,13 @@ fn beyond_opening(
 fn stack_all(parts: &[Matrix<f64>]) -> Matrix<f64> {
     let columns = parts.first().map_or(0, Matrix::columns);
     let all: Vec<Vec<f64>> = (0..columns)
-        .map(|j| parts.iter().flat_map(|part| part.column(j)).copied().collect())
+        .map(|j| {
+            parts
+                .iter()
+                .flat_map(|part| part.column(j))
+                .copied()
+                .collect()
+        })
         .collect();
     Matrix::from_columns(parts.iter().map(Matrix::rows).sum(), &all)
 }

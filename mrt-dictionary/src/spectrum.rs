@@ -54,7 +54,13 @@ pub fn closed_cube_spectra(
     };
     let samples = direct_samples(shape, resolution, &config);
     let prior = light_prior(&samples, &classes, config.k_d);
-    let transport = block_transport(&constant, &constant, &prior.basis, &classes, TABLE_PRIOR_VECTORS);
+    let transport = block_transport(
+        &constant,
+        &constant,
+        &prior.basis,
+        &classes,
+        TABLE_PRIOR_VECTORS,
+    );
     let all_values = |folded: &[mrt_core::matrix::Matrix<f64>]| {
         let mut values: Vec<f64> = folded
             .iter()

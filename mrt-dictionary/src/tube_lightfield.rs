@@ -9,7 +9,7 @@
 //! would where a square grid is masked. The map has every mirror and quarter turn of the grid.
 
 use crate::config::LightfieldConfig;
-use crate::interface::{LightfieldBasis, lightfield_basis, lightfield_from_coefficients};
+use crate::interface::{LightfieldBasis, lightfield_basis, lightfield_coefficients};
 use crate::lightfield::{LightfieldGrid, Tap, frame_of_heading};
 use crate::prior::root_sum_of_squares;
 use crate::progress::{Cancelled, Progress};
@@ -224,7 +224,7 @@ pub fn tube_interface(
     let through = |passage| {
         progress.check()?;
         let sent = tube_propagated(grid, &basis.vectors, passage);
-        Ok(lightfield_from_coefficients(basis, &sent))
+        Ok(lightfield_coefficients(basis, &sent))
     };
     let straight = through(Passage::STRAIGHT)?;
     let left = through(Passage::LEFT)?;
@@ -243,7 +243,7 @@ pub fn tube_interface(
         straight,
         left,
         right,
-        roll: lightfield_from_coefficients(basis, &rolled(grid, &basis.vectors)),
+        roll: lightfield_coefficients(basis, &rolled(grid, &basis.vectors)),
     })
 }
 

@@ -130,7 +130,16 @@ impl<'a> LevelView<'a> {
         let direct: Vec3 = self
             .lights
             .iter()
-            .map(|light| irradiance(self.scene, light, &self.scene.doors, receiver, normal, &Openings))
+            .map(|light| {
+                irradiance(
+                    self.scene,
+                    light,
+                    &self.scene.doors,
+                    receiver,
+                    normal,
+                    &Openings,
+                )
+            })
             .sum();
         let atlas = &self.scene.atlas;
         let indirect = atlas

@@ -3,8 +3,8 @@
 use crate::atlas::AtlasLayout;
 use crate::dictionary::Dictionary;
 use crate::level::{Level, LevelError, Opening, corner_index};
-use crate::propagate;
 use crate::path::hole_of;
+use crate::propagate;
 use crate::scene::{Beyond, Portal, Scene, SceneBlock, SceneShape, Transport};
 use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
@@ -324,8 +324,12 @@ fn place_texels(scene: &mut Scene, level: &Level) {
             // What is in a hole neither reflects nor emits.
             let is_wall = !placed.shape.is_in_hole(face, unit);
             let of_wall = |colour: Vec3| if is_wall { colour } else { Vec3::ZERO };
-            scene.texel_albedo.push(of_wall(block.albedo[turned.index()]));
-            scene.texel_emission.push(of_wall(block.emission[turned.index()]));
+            scene
+                .texel_albedo
+                .push(of_wall(block.albedo[turned.index()]));
+            scene
+                .texel_emission
+                .push(of_wall(block.emission[turned.index()]));
         }
     }
 }

@@ -21,8 +21,34 @@ pub struct Dictionary {
     pub lightfields: LightfieldOperators,
     /// How light passes along whole paths of openings.
     pub paths: PathTable,
+    /// Operators for blocks that are warped too far for the canonical ones; made for a level.
+    pub variants: Vec<Variant>,
     /// What re-gathering and rebuilding warped shapes needs; `None` in packed dictionaries.
     pub sources: Option<Sources>,
+}
+
+/// Operators of a shape for one warp of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// How they were made.
+    pub transport: WarpTransport,
+    /// Corners of the warp from the canonical cube, less the first corner, over the length of the diagonal of their
+    /// bounds: blocks of the same form share a variant wherever they stand and however large they are.
+    pub corners: [[f32; 3]; 8],
+    /// The operators; emission and response modes are those of the dictionary.
+    pub operators: ShapeOperators,
+}
+
+/// Which transport a warped block uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum WarpTransport {
+    /// The canonical shape's, as it is.
+    #[default]
+    Canonical,
+    /// Coefficients of the canonical shape, whose light is gathered anew on the warped walls.
+    Regathered,
+    /// Everything computed for the warped shape.
+    Rebuilt,
 }
 
 /// Operators of one shape; "texels" counts those of the shape's walls ([`Shape::texels`]).

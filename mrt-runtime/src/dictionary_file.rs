@@ -9,7 +9,8 @@
 //! Matrices are column-major `f32`.
 
 use crate::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
+    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
+    Sources,
 };
 use crate::path::Word;
 use crate::shape::{Hole, SHAPES, Shape};
@@ -67,7 +68,9 @@ pub enum DictionaryError {
         found: usize,
     },
     /// Not a path, or not in its place.
-    #[error("dictionary: word {index} is `{found}`; expected canonical words, each once, ascending")]
+    #[error(
+        "dictionary: word {index} is `{found}`; expected canonical words, each once, ascending"
+    )]
     Word {
         /// Its position.
         index: usize,
@@ -140,7 +143,11 @@ impl Dictionary {
         for (hole, matrix) in fields.holes.iter().enumerate() {
             writer.add_numbers(&format!("hole{hole}"), matrix.data())?;
         }
-        let words: Vec<String> = paths.entries.iter().map(|entry| entry.word.name()).collect();
+        let words: Vec<String> = paths
+            .entries
+            .iter()
+            .map(|entry| entry.word.name())
+            .collect();
         writer.add_text("words", &words.join(" "))?;
         writer.add_numbers("e.par", &as_u16(&paths.emission_parity))?;
         writer.add_numbers("r.par", &as_u16(&paths.response_parity))?;
@@ -235,6 +242,7 @@ impl Dictionary {
             shapes,
             lightfields,
             paths,
+            variants: Vec::new(),
             sources,
         })
     }
@@ -452,12 +460,16 @@ fn read_shape(
             for (emission, response) in &[("E", "Q"), ("X", "Y")][..1 + vertical] {
                 let emission = section(&format!("{emission}{m}"));
                 let response = section(&format!("{response}{m}"));
-                operators
-                    .emission_from_coefficients
-                    .push(source.matrix(&emission, sizes.emission_modes, modes)?);
-                operators
-                    .joint_from_response
-                    .push(source.matrix(&response, joint_modes, sizes.response_modes)?);
+                operators.emission_from_coefficients.push(source.matrix(
+                    &emission,
+                    sizes.emission_modes,
+                    modes,
+                )?);
+                operators.joint_from_response.push(source.matrix(
+                    &response,
+                    joint_modes,
+                    sizes.response_modes,
+                )?);
             }
             Ok(operators)
         })

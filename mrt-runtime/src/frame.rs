@@ -48,11 +48,7 @@ pub struct StageTimes {
 impl StageTimes {
     /// Sum over the stages.
     pub fn total(&self) -> Duration {
-        self.direct
-            + self.coefficients
-            + self.responses
-            + self.indirect
-            + self.atlas
+        self.direct + self.coefficients + self.responses + self.indirect + self.atlas
     }
 }
 
@@ -216,7 +212,11 @@ impl Frame {
                 self.coefficients.len() / 3,
                 scene.coefficient_count,
             ),
-            ("joint coefficients", self.joint.len() / 3, scene.joint_count),
+            (
+                "joint coefficients",
+                self.joint.len() / 3,
+                scene.joint_count,
+            ),
             ("doors", self.doors.len(), scene.doors.len()),
             ("lightmap pixels", self.lightmap.len(), pixels),
         ] {

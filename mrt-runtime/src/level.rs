@@ -535,9 +535,7 @@ pub enum CellsError {
         second: usize,
     },
     /// No shape has these openings.
-    #[error(
-        "cell {cell:?} opens towards {openings:?}; expected the openings of a shape"
-    )]
+    #[error("cell {cell:?} opens towards {openings:?}; expected the openings of a shape")]
     NoShape {
         /// The cell.
         cell: [i32; 3],

@@ -130,9 +130,14 @@ impl Transport {
     pub fn multiply(&self, coefficients: &[f32], doors: &[f32], joint: &mut [f32]) {
         self.steady.multiply(coefficients, 3, joint);
         for gate in &self.gated {
-            let value: f32 = gate.doors.iter().map(|&door| doors[door as usize]).product();
+            let value: f32 = gate
+                .doors
+                .iter()
+                .map(|&door| doors[door as usize])
+                .product();
             if value > 0.0 {
-                gate.operator.multiply_add_scaled(coefficients, 3, value, joint);
+                gate.operator
+                    .multiply_add_scaled(coefficients, 3, value, joint);
             }
         }
     }

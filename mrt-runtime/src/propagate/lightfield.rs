@@ -72,8 +72,7 @@ pub(super) fn follow(
                 fields.response_from_lightfield.view(),
                 wave.lightfield.view(),
             );
-            let target_frame =
-                CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
+            let target_frame = CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
             arrive(
                 &mut arrivals,
                 &key.doors,
@@ -89,10 +88,7 @@ pub(super) fn follow(
                 let heading = wave.source_from_here.face(aperture.face);
                 let turns_back = key.headings >> heading.opposite().index() & 1 == 1;
                 let here = &scene.blocks[key.block];
-                let leads_on = matches!(
-                    here.beyond[aperture.face.index()],
-                    Beyond::Block { .. }
-                );
+                let leads_on = matches!(here.beyond[aperture.face.index()], Beyond::Block { .. });
                 if turns_back || !leads_on || aperture.face == key.entered {
                     continue;
                 }
@@ -184,7 +180,10 @@ fn cross(front: &mut Front, scene: &Scene, fields: &LightfieldOperators, sent: S
     if roll.exchanged {
         frame = frame.after(CubeSymmetry::exchange(0, 1));
     }
-    let hole = here.shape.opening(sent.exit).and_then(|o| hole_of(o.outline));
+    let hole = here
+        .shape
+        .opening(sent.exit)
+        .and_then(|o| hole_of(o.outline));
     if let Some(mask) = hole.and_then(|hole| fields.holes.get(usize::from(hole))) {
         lightfield = multiply(mask.view(), lightfield.view());
     }
@@ -198,7 +197,12 @@ fn cross(front: &mut Front, scene: &Scene, fields: &LightfieldOperators, sent: S
     };
     match front.get_mut(&key) {
         Some(there) => {
-            for (sum, &x) in there.lightfield.data_mut().iter_mut().zip(lightfield.data()) {
+            for (sum, &x) in there
+                .lightfield
+                .data_mut()
+                .iter_mut()
+                .zip(lightfield.data())
+            {
                 *sum += x;
             }
         }
