@@ -8,7 +8,7 @@
 use crate::bounce::{restrict_to_shape, wall_fraction};
 use crate::config::BakeConfig;
 use crate::emission::opening_frame;
-use crate::outputs::{PROBE_WEIGHT, ProbeSamples, probe_operator};
+use crate::outputs::{OWN_PROBE_WEIGHT, ProbeSamples, probe_operator};
 use crate::path_transport::{EMITTER, Gather, Signals, gather, texel_at};
 use crate::prior::{ScaledBasis, direct_samples, enriched_prior, light_prior};
 use crate::progress::Cancelled;
@@ -135,7 +135,7 @@ fn folded_outputs(
 ) -> Vec<Matrix<f64>> {
     let (resolution, probes) = (config.resolution, config.outputs.probes);
     let samples = ProbeSamples::default();
-    let at_probes = samples.from_sh(&probe_operator(shape, resolution, probes), PROBE_WEIGHT);
+    let at_probes = samples.from_sh(&probe_operator(shape, resolution, probes), OWN_PROBE_WEIGHT);
     let volume = output_parity_classes(shape, resolution, probes);
     let texels = classes.point_count();
     let padded = Matrix::from_fn(texels + at_probes.rows(), texels, |i, j| {

@@ -2,9 +2,12 @@
 
 use crate::direct::direct_light;
 use crate::light::{Light, LightError, MAX_LIGHT_VALUE, PlacedLight, place};
+use crate::probes::{ProbeOrder, Probes};
 use crate::scene::Scene;
 use crate::visibility::Visibility;
+use glam::Vec3;
 use mrt_core::matrix::{MatrixView, multiply_add};
+use mrt_core::ohlsh::evaluate_f32;
 use std::time::{Duration, Instant};
 
 /// Lights in one frame, at most.
@@ -43,6 +46,19 @@ pub struct StageTimes {
     pub indirect: Duration,
     /// Lightmap atlas.
     pub atlas: Duration,
+    /// Probes, if asked for.
+    pub probes: Duration,
+    /// Vector irradiance, if asked for.
+    pub vector: Duration,
+}
+
+/// What a frame computes besides irradiance and lightmap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// Probes, with so many coefficients.
+    pub probes: Option<ProbeOrder>,
+    /// Vector irradiance at texels.
+    pub vector: bool,
 }
 
 impl StageTimes {
@@ -67,6 +83,8 @@ pub struct Frame {
     indirect: Vec<f32>,
     previous: Vec<f32>,
     lightmap: Vec<[f32; 3]>,
+    probes: Option<Probes>,
+    vector: Vec<f32>,
     times: StageTimes,
     passes: u32,
 }
@@ -119,8 +137,13 @@ pub enum FrameError {
 }
 
 impl Frame {
-    /// Buffers for frames of a scene, all dark.
+    /// Buffers for frames of a scene, all dark, with irradiance and lightmap only.
     pub fn new(scene: &Scene) -> Self {
+        Self::with_outputs(scene, Outputs::default())
+    }
+
+    /// Buffers for frames of a scene, all dark, with everything asked for that the dictionary was baked with.
+    pub fn with_outputs(scene: &Scene, outputs: Outputs) -> Self {
         let texels = 3 * scene.texel_count();
         Self {
             lights: Vec::with_capacity(MAX_LIGHTS),
@@ -132,6 +155,12 @@ impl Frame {
             indirect: vec![0.0; texels],
             previous: vec![0.0; texels],
             lightmap: vec![[0.0; 3]; scene.atlas.width * scene.atlas.height],
+            probes: outputs.probes.and_then(|order| Probes::new(scene, order)),
+            vector: if outputs.vector && scene.has_vector() {
+                vec![0.0; 4 * texels]
+            } else {
+                Vec::new()
+            },
             times: StageTimes::default(),
             passes: 0,
         }
@@ -162,7 +191,7 @@ impl Frame {
             ..StageTimes::default()
         };
         self.bounce(scene, bounces);
-        self.fill_lightmap(scene);
+        self.fill_outputs(scene);
         Ok(())
     }
 
@@ -190,16 +219,26 @@ impl Frame {
         self.direct.copy_from_slice(direct);
         self.times = StageTimes::default();
         self.bounce(scene, bounces);
-        self.fill_lightmap(scene);
+        self.fill_outputs(scene);
         Ok(())
     }
 
-    fn fill_lightmap(&mut self, scene: &Scene) {
+    fn fill_outputs(&mut self, scene: &Scene) {
         let start = Instant::now();
         scene
             .atlas
             .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
-        self.times.atlas = start.elapsed();
+        let after_atlas = Instant::now();
+        if let Some(probes) = &mut self.probes {
+            probes.fill(scene, &self.joint);
+        }
+        let after_probes = Instant::now();
+        if !self.vector.is_empty() {
+            vector_from_joint(scene, &self.joint, &mut self.vector);
+        }
+        self.times.atlas = after_atlas - start;
+        self.times.probes = after_probes - after_atlas;
+        self.times.vector = after_probes.elapsed();
     }
 
     fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
@@ -284,7 +323,7 @@ impl Frame {
         indirect_from_joint(scene, &self.joint, &mut self.indirect);
         // Truncated bases leave small negative values; they end here, once, on the final sum.
         self.indirect.iter_mut().for_each(|e| *e = e.max(0.0));
-        limit_flux(scene, &self.radiosity, &mut self.indirect);
+        limit_flux(scene, &self.radiosity, &mut self.indirect, &mut self.joint);
         let end = Instant::now();
         self.times.coefficients += after_coefficients - start;
         self.times.responses += after_responses - after_coefficients;
@@ -345,6 +384,37 @@ impl Frame {
     /// Padded lightmap of indirect irradiance, row by row; see [`Scene::atlas`].
     pub fn lightmap(&self) -> &[[f32; 3]] {
         &self.lightmap
+    }
+
+    /// Probes, if asked for and there are any.
+    pub fn probes(&self) -> Option<&Probes> {
+        self.probes.as_ref()
+    }
+
+    /// Vector irradiance, if asked for and there is any: block by block, in a block channel by channel, in a
+    /// channel texel by texel four coefficients of 1, v, normal and u in the texel's tangent frame.
+    /// [`mrt_core::ohlsh::evaluate_f32`] gives irradiance for a normal.
+    pub fn vector(&self) -> &[f32] {
+        &self.vector
+    }
+
+    /// Indirect irradiance, RGB, at one texel of a block for a unit normal in the texel's tangent frame (along u,
+    /// along v, along the wall's normal); zero where truncation makes it negative, and without vector irradiance.
+    ///
+    /// # Panics
+    /// If the scene has no such block or the block no such texel.
+    pub fn vector_at(&self, scene: &Scene, block: usize, texel: usize, normal: Vec3) -> [f32; 3] {
+        let range = &scene.blocks[block].texels;
+        assert!(texel < range.len(), "texel {texel} of {}", range.len());
+        if self.vector.is_empty() {
+            return [0.0; 3];
+        }
+        let start = 4 * (3 * range.start + texel);
+        std::array::from_fn(|channel| {
+            let at = start + 4 * channel * range.len();
+            let c = std::array::from_fn(|k| self.vector[at + k]);
+            evaluate_f32(&c, normal).max(0.0)
+        })
     }
 
     /// Time that each stage took, summed over the passes.
@@ -414,11 +484,23 @@ fn indirect_from_joint(scene: &Scene, joint: &[f32], indirect: &mut [f32]) {
     }
 }
 
+/// Vector irradiance, in the joint basis.
+fn vector_from_joint(scene: &Scene, joint: &[f32], vector: &mut [f32]) {
+    vector.fill(0.0);
+    for block in &scene.blocks {
+        let basis = &scene.shapes[block.shape_index].vector_basis;
+        let c = &joint[3 * block.joint.start..3 * block.joint.end];
+        let c = MatrixView::new(block.joint.len(), 3, c);
+        let out = &mut vector[12 * block.texels.start..12 * block.texels.end];
+        multiply_add(basis.view(), c, out);
+    }
+}
+
 /// Scales a channel down where more flux would arrive on all walls than left them.
 ///
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so total flux
 /// falls by the largest albedo at each bounce, whatever the level. Texels of canonical blocks have equal areas.
-fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
+fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32], joint: &mut [f32]) {
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0f64, 0.0f64);
         for block in &scene.blocks {
@@ -433,6 +515,10 @@ fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
                 let start = 3 * block.texels.start + channel * block.texels.len();
                 for e in &mut indirect[start..start + block.texels.len()] {
                     *e *= scale;
+                }
+                let start = 3 * block.joint.start + channel * block.joint.len();
+                for c in &mut joint[start..start + block.joint.len()] {
+                    *c *= scale;
                 }
             }
         }

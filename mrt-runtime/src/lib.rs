@@ -52,5 +52,6 @@ mod propagate;
 pub mod light;
 pub mod visibility;
 pub mod direct;
+pub mod probes;
 pub mod frame;
 pub mod atlas;

@@ -175,6 +175,14 @@ pub struct SceneShape {
 }
 
 impl Scene {
+    /// True if every shape has vector irradiance.
+    pub fn has_vector(&self) -> bool {
+        self.blocks.iter().all(|block| {
+            let rows = self.shapes[block.shape_index].vector_basis.rows();
+            rows == 4 * block.texels.len()
+        })
+    }
+
     /// Number of texels over all blocks.
     pub fn texel_count(&self) -> usize {
         self.texel_positions.len()

@@ -20,6 +20,9 @@ use crate::error_measure::cell_hops;
 /// Reflections in the last term of an `irradiance_rgb` file, named `all_bounces` there.
 pub const RGB_BOUNCES: usize = 10;
 
+/// Reflections in the last term of a `radiance_sh9` file.
+pub const PROBE_BOUNCES: usize = 8;
+
 /// What a file's numbers are.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Kind {

@@ -2,16 +2,19 @@
 
 use crate::dictionary_source::{SourceError, load};
 use crate::table::Table;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
 use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, FrameError};
+use mrt_runtime::frame::{Bounces, Frame, FrameError, Outputs};
 use mrt_runtime::level::{CellsError, Level};
 use mrt_runtime::light::Light;
+use mrt_runtime::probes::ProbeOrder;
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::Openings;
 use mrt_tests::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
-use mrt_tests::oracle_file::{Kind, RGB_BOUNCES, ReferenceError, ReferenceFile, read};
+use mrt_tests::oracle_file::{
+    Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceError, ReferenceFile, read,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -105,13 +108,21 @@ pub enum AccuracyError {
         /// Why.
         source: FrameError,
     },
-    /// Probe references.
+    /// Probe references need probes.
     #[error(
-        "{scene}: references of kind radiance_sh9 (probes) are not supported; expected irradiance"
+        "{scene}: the reference holds probes, and the dictionary has none; expected one baked with probes"
     )]
-    Probes {
+    NoProbes {
         /// Name of the reference.
         scene: String,
+    },
+    /// A probe outside the level.
+    #[error("{scene}: probe {found} is in no block of the level")]
+    ProbeOutside {
+        /// Name of the reference.
+        scene: String,
+        /// Where it is.
+        found: DVec3,
     },
     /// An albedo for which bounces do not die out.
     #[error("albedo {found}; expected {expected}")]
@@ -213,15 +224,13 @@ pub fn compare(
     args: &AccuracyArgs,
 ) -> Result<Vec<LightAccuracy>, AccuracyError> {
     let scene_name = || reference.name.clone();
-    let Some(resolution) = reference.resolution else {
-        return Err(AccuracyError::Probes {
-            scene: scene_name(),
-        });
+    let albedo = match (&reference.kind, args.bounces, args.albedo) {
+        // All bounces of probe references have an albedo of their own.
+        (Kind::RadianceSh9 { albedo, .. }, BouncesArg::All, _) => *albedo,
+        (_, _, Some(albedo)) => albedo,
+        (_, BouncesArg::First, None) => 1.0,
+        (_, BouncesArg::All, None) => 0.5,
     };
-    let albedo = args.albedo.unwrap_or(match args.bounces {
-        BouncesArg::First => 1.0,
-        BouncesArg::All => 0.5,
-    });
     let level = level(reference, albedo)?;
     let config = AssembleConfig {
         coupling: args.coupling.into(),
@@ -233,7 +242,12 @@ pub fn compare(
             scene: scene_name(),
             source,
         })?;
-    let mut frame = Frame::new(&scene);
+    let is_probes = matches!(reference.kind, Kind::RadianceSh9 { .. });
+    let outputs = Outputs {
+        probes: is_probes.then_some(ProbeOrder::L2),
+        vector: false,
+    };
+    let mut frame = Frame::with_outputs(&scene, outputs);
     (0..reference.lights.len())
         .map(|light| {
             let source = Light::Sphere {
@@ -248,7 +262,7 @@ pub fn compare(
                     source,
                 })?;
             let theirs = reference_signal(reference, light, albedo, args)?;
-            let ours = our_signal(reference, &scene, &frame, resolution);
+            let ours = our_signal(reference, &scene, &frame)?;
             Ok(LightAccuracy {
                 scene: scene_name(),
                 light,
@@ -258,7 +272,11 @@ pub fn compare(
                 },
                 preset: dictionary.preset.clone(),
                 rel_l2: rel_l2(&ours, &theirs),
-                rel_l2_by_hop: rel_l2_by_hop(&ours, &theirs, &reference.hops(light)?),
+                rel_l2_by_hop: if is_probes {
+                    [None; HOP_GROUPS]
+                } else {
+                    rel_l2_by_hop(&ours, &theirs, &reference.hops(light)?)
+                },
             })
         })
         .collect()
@@ -283,6 +301,7 @@ fn level(reference: &ReferenceFile, albedo: f64) -> Result<Level, AccuracyError>
 fn frame_bounces(reference: &ReferenceFile, args: &AccuracyArgs) -> Bounces {
     match (args.bounces, &reference.kind) {
         (BouncesArg::First, _) => Bounces::Count(1),
+        (BouncesArg::All, Kind::RadianceSh9 { .. }) => Bounces::Count(PROBE_BOUNCES as u32),
         // Coloured references stop after a stated number of bounces.
         (BouncesArg::All, Kind::IrradianceRgb { .. }) => Bounces::Count(RGB_BOUNCES as u32),
         (BouncesArg::All, _) => Bounces::Converged {
@@ -308,6 +327,9 @@ fn reference_signal(
             let rgb = reference.indirect_irradiance_rgb(light, bounces)?;
             Ok(rgb.as_flattened().to_vec())
         }
+        Kind::RadianceSh9 { .. } => {
+            reference.term(light, usize::from(args.bounces == BouncesArg::All))
+        }
         _ => reference.indirect_irradiance(light, bounces, albedo),
     }
 }
@@ -320,8 +342,11 @@ fn our_signal(
     reference: &ReferenceFile,
     scene: &Scene,
     frame: &Frame,
-    resolution: usize,
-) -> Vec<f64> {
+) -> Result<Vec<f64>, AccuracyError> {
+    if let Kind::RadianceSh9 { points, .. } = &reference.kind {
+        return our_probes(reference, scene, frame, points);
+    }
+    let resolution = reference.resolution.unwrap_or(scene.resolution);
     let channels = match reference.kind {
         Kind::IrradianceRgb { .. } => 3,
         _ => 1,
@@ -344,7 +369,31 @@ fn our_signal(
             ours.extend(light[..channels].iter().map(|&e| f64::from(e)));
         }
     }
-    ours
+    Ok(ours)
+}
+
+/// Our incident radiance at the reference's points, nine coefficients each.
+fn our_probes(
+    reference: &ReferenceFile,
+    scene: &Scene,
+    frame: &Frame,
+    points: &[DVec3],
+) -> Result<Vec<f64>, AccuracyError> {
+    let scene_name = || reference.name.clone();
+    let probes = frame.probes().ok_or_else(|| AccuracyError::NoProbes {
+        scene: scene_name(),
+    })?;
+    let mut ours = Vec::with_capacity(9 * points.len());
+    for &point in points {
+        let light = probes
+            .at(scene, point)
+            .ok_or_else(|| AccuracyError::ProbeOutside {
+                scene: scene_name(),
+                found: point,
+            })?;
+        ours.extend(light.iter().map(|rgb| f64::from(rgb[0])));
+    }
+    Ok(ours)
 }
 
 fn print(all: &[LightAccuracy]) {

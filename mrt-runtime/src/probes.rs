@@ -1,0 +1,215 @@
+//! Probes: incident indirect light on a grid in every block, for things that move (Loos et al. 2011, section 6.5).
+//!
+//! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
+//! walls, so both show the same light. Between probes the light is interpolated, across openings too.
+
+use crate::scene::{Beyond, Scene, SceneBlock};
+use glam::{DMat3, DVec3, Vec3};
+use mrt_core::cube::Face;
+use mrt_core::matrix::{Matrix, MatrixView, multiply_add};
+use mrt_core::sh;
+
+/// Coefficients of a probe: bands 0 to 2.
+pub const PROBE_COEFFICIENTS: usize = 9;
+
+/// How much of the light's directions probes keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ProbeOrder {
+    /// Four coefficients: bands 0 and 1.
+    L1,
+    /// Nine: bands 0 to 2.
+    L2,
+}
+
+impl ProbeOrder {
+    /// Coefficients of a probe.
+    pub fn coefficients(self) -> usize {
+        match self {
+            ProbeOrder::L1 => 4,
+            ProbeOrder::L2 => 9,
+        }
+    }
+}
+
+/// The probes of a scene after a frame.
+///
+/// Storage is block by block; in a block probe by probe, x fastest, then y, then z in the canonical cube at
+/// (i + 0.5) / n; in a probe coefficient by coefficient, RGB each.
+#[derive(Clone, Debug)]
+pub struct Probes {
+    order: ProbeOrder,
+    per_axis: usize,
+    values: Vec<[f32; 3]>,
+    /// Light of one block in its own axes, channel by channel.
+    scratch: Vec<f32>,
+    /// To world axes, each band's matrix, by block.
+    rotations: Vec<Vec<Matrix<f64>>>,
+}
+
+impl Probes {
+    /// Dark probes for a scene, or `None` if its dictionary was baked without.
+    pub(crate) fn new(scene: &Scene, order: ProbeOrder) -> Option<Self> {
+        let count = scene.probes * scene.probes * scene.probes;
+        (count > 0).then(|| Self {
+            order,
+            per_axis: scene.probes,
+            values: vec![[0.0; 3]; scene.blocks.len() * count * order.coefficients()],
+            scratch: vec![0.0; 3 * count * PROBE_COEFFICIENTS],
+            rotations: scene
+                .blocks
+                .iter()
+                .map(|block| sh::rotation_matrices(3, &rotation_of(block)))
+                .collect(),
+        })
+    }
+
+    /// How many coefficients each probe has.
+    pub fn order(&self) -> ProbeOrder {
+        self.order
+    }
+
+    /// Probes along an edge of a block.
+    pub fn per_axis(&self) -> usize {
+        self.per_axis
+    }
+
+    /// All coefficients, W/(m² sr) times the square root of steradian; see [`Probes`] for their order.
+    pub fn values(&self) -> &[[f32; 3]] {
+        &self.values
+    }
+
+    /// All coefficients as the bits of half-precision numbers, in the same order: what a texture takes.
+    ///
+    /// Values beyond 65,504 become that.
+    ///
+    /// # Panics
+    /// If `out` is not as long as [`Probes::values`].
+    pub fn write_f16(&self, out: &mut [[u16; 3]]) {
+        assert_eq!(out.len(), self.values.len(), "coefficients");
+        for (to, from) in out.iter_mut().zip(&self.values) {
+            *to = from.map(|x| {
+                let largest = f32::from(half::f16::MAX);
+                half::f16::from_f32(x.clamp(-largest, largest)).to_bits()
+            });
+        }
+    }
+
+    /// Expands the joint coefficients of all blocks.
+    pub(crate) fn fill(&mut self, scene: &Scene, joint: &[f32]) {
+        let count = self.per_axis * self.per_axis * self.per_axis;
+        let kept = self.order.coefficients();
+        for (index, block) in scene.blocks.iter().enumerate() {
+            let basis = &scene.shapes[block.shape_index].probe_basis;
+            let c = &joint[3 * block.joint.start..3 * block.joint.end];
+            self.scratch.fill(0.0);
+            let c = MatrixView::new(block.joint.len(), 3, c);
+            multiply_add(basis.view(), c, &mut self.scratch);
+            let bands = &self.rotations[index];
+            let channel = count * PROBE_COEFFICIENTS;
+            for probe in 0..count {
+                let out = &mut self.values[(index * count + probe) * kept..][..kept];
+                for c in 0..3 {
+                    let start = c * channel + probe * PROBE_COEFFICIENTS;
+                    let mut coefficients = [0.0f64; PROBE_COEFFICIENTS];
+                    for (to, &from) in coefficients.iter_mut().zip(&self.scratch[start..]) {
+                        *to = f64::from(from);
+                    }
+                    sh::rotate(bands, &mut coefficients);
+                    for (to, &from) in out.iter_mut().zip(&coefficients) {
+                        to[c] = from as f32;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Light at a point of the world: trilinear between the probes around it, those of joined blocks included;
+    /// `None` outside all blocks. Coefficients beyond the probes' order are zero.
+    pub fn at(&self, scene: &Scene, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
+        let block = scene.block_at(point, LOOKUP_TOLERANCE)?;
+        let unit = scene.blocks[block].warp.inverse(point)?;
+        let place = unit * self.per_axis as f64 - 0.5;
+        let low = place.floor();
+        let weight = place - low;
+        let mut sum = [[0.0f32; 3]; PROBE_COEFFICIENTS];
+        for corner in 0..8 {
+            let bits = DVec3::new(
+                f64::from(corner & 1),
+                f64::from(corner >> 1 & 1),
+                f64::from(corner >> 2 & 1),
+            );
+            let share = bits * weight + (DVec3::ONE - bits) * (DVec3::ONE - weight);
+            let share = share.element_product() as f32;
+            for (sum, value) in sum.iter_mut().zip(self.probe(scene, block, low + bits)) {
+                for (sum, x) in sum.iter_mut().zip(value) {
+                    *sum += share * x;
+                }
+            }
+        }
+        Some(sum)
+    }
+
+    /// A probe by its place in a block's grid, which may be one step outside: then it is the neighbour's
+    /// across an opening, and the nearest inside at a wall.
+    fn probe(&self, scene: &Scene, block: usize, place: DVec3) -> &[[f32; 3]] {
+        let n = self.per_axis as f64;
+        let mut block = block;
+        let mut point = (place + 0.5) / n;
+        for _ in 0..3 {
+            let outside = Face::ALL.into_iter().find(|face| {
+                let along = point[face.axis()];
+                if face.is_positive() {
+                    along > 1.0
+                } else {
+                    along < 0.0
+                }
+            });
+            let Some(face) = outside else { break };
+            match scene.blocks[block].beyond[face.index()] {
+                Beyond::Block {
+                    block: next,
+                    here_from_there,
+                    ..
+                } if scene.blocks[block].shape.is_open(face) => {
+                    point = here_from_there.inverse().point(point - face.outward());
+                    block = next;
+                }
+                _ => point[face.axis()] = point[face.axis()].clamp(0.5 / n, 1.0 - 0.5 / n),
+            }
+        }
+        let index = |x: f64| (x * n).floor().clamp(0.0, n - 1.0) as usize;
+        let (x, y, z) = (index(point.x), index(point.y), index(point.z));
+        let probe = (z * self.per_axis + y) * self.per_axis + x;
+        let count = self.per_axis * self.per_axis * self.per_axis;
+        let kept = self.order.coefficients();
+        &self.values[(block * count + probe) * kept..][..kept]
+    }
+}
+
+/// Points may lie outside blocks by this fraction of their size.
+const LOOKUP_TOLERANCE: f64 = 1e-4;
+
+/// Irradiance, W/m², on a surface of unit `normal` under a probe's light; what truncation leaves negative is zero.
+pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {
+    let channel = |c: usize| {
+        let mut radiance = [0.0f32; PROBE_COEFFICIENTS];
+        for (to, from) in radiance.iter_mut().zip(coefficients) {
+            *to = from[c];
+        }
+        sh::irradiance(&radiance, normal.as_dvec3()).max(0.0) as f32
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
+}
+
+/// The rotation of a block's canonical axes to the world's: the orthogonal matrix nearest to its warp's
+/// derivative in the middle, by Newton's iteration for the polar decomposition (Higham 1986).
+fn rotation_of(block: &SceneBlock) -> DMat3 {
+    let mut rotation = block.warp.jacobian(DVec3::splat(0.5));
+    for _ in 0..POLAR_STEPS {
+        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
+    }
+    rotation
+}
+
+/// Steps of the polar decomposition: each doubles the digits, after a few for the size of the block.
+const POLAR_STEPS: usize = 40;
