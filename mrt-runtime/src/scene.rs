@@ -1,6 +1,7 @@
 //! What the frame reads: a level joined with a dictionary, packed and immutable.
 
 use crate::atlas::AtlasLayout;
+use crate::light::MAX_LIGHT_VALUE;
 use crate::shape::{Aperture, Shape};
 use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
@@ -25,7 +26,7 @@ pub struct Scene {
     pub texel_positions: Vec<Vec3>,
     /// Unit normals into the blocks.
     pub texel_normals: Vec<Vec3>,
-    /// Linear RGB albedo of all texels.
+    /// Linear RGB albedo of all texels; [`Scene::set_texel_albedo`] changes it.
     pub texel_albedo: Vec<Vec3>,
     /// Radiosity that texels emit of themselves, linear RGB, W/m².
     pub texel_emission: Vec<Vec3>,
@@ -161,6 +162,47 @@ pub enum Beyond {
     },
 }
 
+/// Why the surface of a block was not changed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SurfaceError {
+    /// No such block.
+    #[error("block {found}; expected an index below {expected}")]
+    Block {
+        /// Number of blocks.
+        expected: usize,
+        /// The index given.
+        found: usize,
+    },
+    /// Not one value a texel.
+    #[error("block {block}: {found} values of {what}; expected {expected}, one a texel")]
+    Length {
+        /// Which block.
+        block: usize,
+        /// What was to be set.
+        what: &'static str,
+        /// Texels of the block.
+        expected: usize,
+        /// Values given.
+        found: usize,
+    },
+    /// A value that is negative, too large or NaN.
+    #[error(
+        "block {block}, texel {texel}: {what} {found}; expected three values in [0, {largest:e}]"
+    )]
+    Value {
+        /// Which block.
+        block: usize,
+        /// Which texel of it.
+        texel: usize,
+        /// What was to be set.
+        what: &'static str,
+        /// Largest accepted.
+        largest: f32,
+        /// The value given.
+        found: Vec3,
+    },
+}
+
 /// Operators of a shape that frames use.
 #[derive(Clone, Debug)]
 pub struct SceneShape {
@@ -175,6 +217,90 @@ pub struct SceneShape {
 }
 
 impl Scene {
+    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels;
+    /// texels in holes keep none. The next frame sees it.
+    ///
+    /// # Errors
+    /// [`SurfaceError`], if there is no such block, not as many values as texels, or one outside [0, 1]; the scene
+    /// is then as it was.
+    pub fn set_texel_albedo(&mut self, block: usize, albedo: &[Vec3]) -> Result<(), SurfaceError> {
+        let range = self.check_surface(block, albedo, "albedo", 1.0)?;
+        let in_holes = self.in_holes(block);
+        for ((to, &from), is_in_hole) in self.texel_albedo[range]
+            .iter_mut()
+            .zip(albedo)
+            .zip(in_holes)
+        {
+            if !is_in_hole {
+                *to = from;
+            }
+        }
+        Ok(())
+    }
+
+    /// Lets each texel of a block emit radiosity of its own, linear RGB, W/m², in the same order.
+    ///
+    /// # Errors
+    /// [`SurfaceError`], as for [`Scene::set_texel_albedo`], with values in [0, [`MAX_LIGHT_VALUE`]].
+    pub fn set_texel_emission(
+        &mut self,
+        block: usize,
+        emission: &[Vec3],
+    ) -> Result<(), SurfaceError> {
+        let range = self.check_surface(block, emission, "emission", MAX_LIGHT_VALUE)?;
+        let in_holes = self.in_holes(block);
+        for ((to, &from), is_in_hole) in self.texel_emission[range]
+            .iter_mut()
+            .zip(emission)
+            .zip(in_holes)
+        {
+            if !is_in_hole {
+                *to = from;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_surface(
+        &self,
+        block: usize,
+        values: &[Vec3],
+        what: &'static str,
+        largest: f32,
+    ) -> Result<Range<usize>, SurfaceError> {
+        let placed = self.blocks.get(block).ok_or(SurfaceError::Block {
+            found: block,
+            expected: self.blocks.len(),
+        })?;
+        if values.len() != placed.texels.len() {
+            return Err(SurfaceError::Length {
+                block,
+                what,
+                expected: placed.texels.len(),
+                found: values.len(),
+            });
+        }
+        let is_legal = |value: &Vec3| value.to_array().iter().all(|x| (0.0..=largest).contains(x));
+        match values.iter().position(|value| !is_legal(value)) {
+            Some(texel) => Err(SurfaceError::Value {
+                block,
+                texel,
+                what,
+                largest,
+                found: values[texel],
+            }),
+            None => Ok(placed.texels.clone()),
+        }
+    }
+
+    /// For each texel of a block whether it is in a hole.
+    fn in_holes(&self, block: usize) -> impl Iterator<Item = bool> + use<> {
+        let shape = self.blocks[block].shape;
+        shape
+            .texels(self.resolution)
+            .map(move |(face, center)| shape.is_in_hole(face, center))
+    }
+
     /// True if every shape has vector irradiance.
     pub fn has_vector(&self) -> bool {
         self.blocks.iter().all(|block| {
