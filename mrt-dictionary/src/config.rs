@@ -149,9 +149,9 @@ impl BakeConfig {
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
         let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name
         {
-            "mobile" => (6, 12, 64, [32, 24, 6], 3),
-            "standard" => (16, 32, 128, [96, 64, 16], 5),
-            "quality" => (16, 96, 192, [160, 128, 32], 5),
+            "mobile" => (6, 12, 64, [32, 24, 12], 4),
+            "standard" => (16, 32, 128, [96, 64, 32], 5),
+            "quality" => (16, 96, 192, [160, 160, 96], 5),
             _ => {
                 return Err(ConfigError::UnknownPreset {
                     found: name.to_owned(),
@@ -371,7 +371,7 @@ impl Default for CouplingConfig {
         Self {
             emission_modes: 96,
             response_modes: 64,
-            foreign_modes: 16,
+            foreign_modes: 32,
             depth: 5,
             hole_depth: 3,
             beyond_weight: 1.0,

@@ -162,10 +162,7 @@ impl Dictionary {
 
     /// True when openings may meet with their up directions a quarter turn apart.
     pub fn has_exchanges(&self) -> bool {
-        self.shapes
-            .iter()
-            .flat_map(|shape| &shape.openings)
-            .all(|opening| opening.emission_from_coefficients.len() == 2)
+        self.lightfields.exchange.rows() > 0
     }
 
     /// Bytes of all matrices.

@@ -343,6 +343,7 @@ fn far_levels_and_endless_depths_are_refused() {
     let config = |max_depth, max_bytes| AssembleConfig {
         max_depth,
         max_bytes,
+        ..AssembleConfig::default()
     };
     let refused = |level: &Level, config| {
         assemble(level, default_dictionary(), &config).expect_err("refused")
