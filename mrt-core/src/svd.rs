@@ -3,8 +3,15 @@
 //! A decomposition has the same bits on every machine: nalgebra is built without its run-time
 //! choice of instruction set, vectors are ordered by falling singular value, and signs are fixed.
 
+mod jacobi;
+
 use crate::matrix::{Matrix, MatrixView, Scalar, multiply};
+use jacobi::one_sided_jacobi;
 use nalgebra::DMatrix;
+
+/// Iterations for each row or column after which nalgebra's methods are given up: they take two or three, and on
+/// some matrices of low rank, where rotations underflow, they never end or give NaN.
+const MAX_ITERATIONS: usize = 30;
 
 /// A thin decomposition `a = u * diag(singular_values) * vᵀ`, largest value first.
 #[derive(Clone, Debug)]
@@ -31,22 +38,48 @@ pub fn svd(a: MatrixView<f64>) -> Svd {
             v: Matrix::zeros(columns, 0),
         };
     }
-    let full = DMatrix::from_column_slice(rows, columns, a.data()).svd(true, true);
-    let (u, v_t) = (
-        full.u.unwrap_or_else(|| DMatrix::zeros(rows, rank)),
-        full.v_t.unwrap_or_else(|| DMatrix::zeros(rank, columns)),
-    );
+    let (u, values, v) = decompose(a);
     let mut order: Vec<usize> = (0..rank).collect();
-    order.sort_by(|&i, &j| full.singular_values[j].total_cmp(&full.singular_values[i]));
+    order.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
     let signs: Vec<f64> = order
         .iter()
-        .map(|&k| largest_entry_sign(u.column(k).as_slice()))
+        .map(|&k| largest_entry_sign(u.column(k)))
         .collect();
     Svd {
         u: Matrix::from_fn(rows, rank, |i, j| u[(i, order[j])] * signs[j]),
-        singular_values: order.iter().map(|&k| full.singular_values[k]).collect(),
-        v: Matrix::from_fn(columns, rank, |i, j| v_t[(order[j], i)] * signs[j]),
+        singular_values: order.iter().map(|&k| values[k]).collect(),
+        v: Matrix::from_fn(columns, rank, |i, j| v[(i, order[j])] * signs[j]),
     }
+}
+
+/// Left vectors, singular values and right vectors in any order.
+fn decompose(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Matrix<f64>) {
+    let (rows, columns) = (a.rows(), a.columns());
+    let epsilon = 5.0 * f64::EPSILON;
+    let limit = MAX_ITERATIONS * rows.min(columns);
+    let full = DMatrix::from_column_slice(rows, columns, a.data());
+    if let Some(nalgebra::SVD {
+        u: Some(u),
+        v_t: Some(v_t),
+        singular_values,
+    }) = full.try_svd(true, true, epsilon, limit)
+    {
+        let values = singular_values.as_slice().to_vec();
+        let parts = [u.as_slice(), v_t.as_slice(), &values];
+        if parts.iter().all(|part| part.iter().all(|x| x.is_finite())) {
+            return (
+                Matrix::from_column_major(rows, values.len(), u.as_slice().to_vec()),
+                values,
+                Matrix::from_fn(columns, v_t.nrows(), |i, j| v_t[(j, i)]),
+            );
+        }
+    }
+    if rows >= columns {
+        return one_sided_jacobi(a);
+    }
+    let transposed = Matrix::from_fn(columns, rows, |i, j| a.column(i)[j]);
+    let (v, values, u) = one_sided_jacobi(transposed.view());
+    (u, values, v)
 }
 
 /// Eigenvalues, falling, and eigenvectors of a symmetric matrix (only its lower triangle is read).
@@ -59,12 +92,35 @@ pub fn symmetric_eigen(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
     if size == 0 {
         return (Vec::new(), Matrix::zeros(0, 0));
     }
-    let eigen = DMatrix::from_column_slice(size, size, a.data()).symmetric_eigen();
+    let (values, vectors) = decompose_symmetric(a);
     let mut order: Vec<usize> = (0..size).collect();
-    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
-    let vectors = Matrix::from_fn(size, size, |i, j| eigen.eigenvectors[(i, order[j])]);
-    let values = order.iter().map(|&k| eigen.eigenvalues[k]).collect();
-    (values, vectors)
+    order.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
+    let vectors = Matrix::from_fn(size, size, |i, j| vectors[(i, order[j])]);
+    (order.iter().map(|&k| values[k]).collect(), vectors)
+}
+
+/// Eigenvalues and eigenvectors in any order.
+fn decompose_symmetric(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
+    let size = a.rows();
+    let full = DMatrix::from_column_slice(size, size, a.data());
+    if let Some(eigen) = full.try_symmetric_eigen(f64::EPSILON, MAX_ITERATIONS * size) {
+        let (values, vectors) = (eigen.eigenvalues.as_slice(), eigen.eigenvectors.as_slice());
+        if values.iter().chain(vectors).all(|x| x.is_finite()) {
+            let vectors = Matrix::from_column_major(size, size, vectors.to_vec());
+            return (values.to_vec(), vectors);
+        }
+    }
+    // Right vectors of a symmetric matrix are its eigenvectors; those of one value and its negative, if both
+    // occur, would be mixed, but the matrices that come here are of scalar products.
+    let symmetric = Matrix::from_fn(size, size, |i, j| a.column(i.min(j))[i.max(j)]);
+    let (left, values, right) = one_sided_jacobi(symmetric.view());
+    let signed = (0..size)
+        .map(|k| {
+            let sign = crate::matrix::dot(left.column(k), right.column(k));
+            if sign < 0.0 { -values[k] } else { values[k] }
+        })
+        .collect();
+    (signed, right)
 }
 
 /// Squarings in [`spectral_radius`]: the power 2^40 of a matrix of condition 1e300 is off by one part in
