@@ -319,7 +319,13 @@ mod tests {
         let prior = light_prior(&weights.weigh(&samples), &classes, usize::MAX);
         let folded = fold_bounce(&weights.weigh_operator(&bounce), &classes);
         let transport = |modes| {
-            weights.unweigh_transport(block_transport(&folded, &prior.basis, &classes, modes))
+            weights.unweigh_transport(block_transport(
+                &folded,
+                &folded,
+                &prior.basis,
+                &classes,
+                modes,
+            ))
         };
         let all = all_samples(form, resolution, 4);
         let exact = multiply(bounce.view(), all.view());

@@ -15,6 +15,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// The preset whose dictionary is part of the program.
 pub const DEFAULT_PRESET: &str = "standard";
 
+/// The set of shapes of that dictionary.
+pub const DEFAULT_SET: &str = "cubes-2d";
+
 /// The default dictionary, as `mrt bake` writes it.
 pub static DEFAULT_DICTIONARY: &[u8] = include_bytes!("../../assets/cubes-2d-standard.mrt");
 
@@ -47,16 +50,26 @@ pub enum SourceError {
 /// # Errors
 /// [`SourceError`].
 pub fn load(file: Option<&Path>, preset: Option<&str>) -> Result<Dictionary, SourceError> {
-    match (file, preset) {
-        (Some(path), _) => from_file(path),
-        (None, None | Some(DEFAULT_PRESET)) => {
-            parse(DEFAULT_DICTIONARY, "the built-in dictionary".to_owned())
-        }
-        (None, Some(name)) => {
-            let config = BakeConfig::preset(name)?;
-            Ok(bake_with_progress(&config)?)
-        }
+    match file {
+        Some(path) => from_file(path),
+        None => from_preset(DEFAULT_SET, preset),
     }
+}
+
+/// A preset's dictionary of a set of shapes; without a preset, the default's. All but the one that is part of the
+/// program are baked now.
+///
+/// # Errors
+/// [`SourceError::Config`] and [`SourceError::Cancelled`].
+pub fn from_preset(set: &str, preset: Option<&str>) -> Result<Dictionary, SourceError> {
+    let preset = preset.unwrap_or(DEFAULT_PRESET);
+    if (set, preset) == (DEFAULT_SET, DEFAULT_PRESET) {
+        return parse(DEFAULT_DICTIONARY, "the built-in dictionary".to_owned());
+    }
+    let mut config = BakeConfig::preset(preset)?;
+    set.clone_into(&mut config.shapes);
+    config.check()?;
+    Ok(bake_with_progress(&config)?)
 }
 
 /// Reads a dictionary file.

@@ -138,6 +138,20 @@ pub struct PathEntry {
     pub response_from_emission: Matrix<f32>,
 }
 
+impl PathTable {
+    /// Openings of the longest paths that the table has all of, for those without a hole, with one, and with more.
+    pub fn depths(&self) -> [usize; 3] {
+        let mut depths = [0; 3];
+        for entry in &self.entries {
+            let crossings = entry.word.crossings();
+            let holes = crossings.iter().filter(|c| c.hole.is_some()).count();
+            let depth = &mut depths[holes.min(2)];
+            *depth = crossings.len().max(*depth);
+        }
+        depths
+    }
+}
+
 /// Bases in texel space that only tools need.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sources {
@@ -162,10 +176,7 @@ impl Dictionary {
 
     /// True when openings may meet with their up directions a quarter turn apart.
     pub fn has_exchanges(&self) -> bool {
-        self.shapes
-            .iter()
-            .flat_map(|shape| &shape.openings)
-            .all(|opening| opening.emission_from_coefficients.len() == 2)
+        self.lightfields.exchange.rows() > 0
     }
 
     /// Bytes of all matrices.

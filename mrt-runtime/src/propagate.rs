@@ -4,7 +4,7 @@
 //! A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of
 //! openings that turns back carries nothing and is left out; the paper follows all sequences. Either the
 //! dictionary's table has the operator of a whole sequence ([`table`]), or lightfields are passed on from opening
-//! to opening as in the paper ([`lightfield`]). Both give responses at the openings that light enters through,
+//! to opening as in the paper ([`lightfield`]); longer sequences than the table's take the second way. Both give responses at the openings that light enters through,
 //! and those are projected on the joint basis of the block behind, where the paper keeps a basis for each opening.
 
 mod lightfield;
@@ -12,13 +12,15 @@ mod table;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::Dictionary;
-use crate::path::Roll;
+use crate::path::{Roll, hole_of};
 use crate::scene::{Gate, Scene, Transport};
+use crate::shape::Aperture;
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, multiply_add};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
@@ -46,13 +48,22 @@ pub(crate) fn joint_from_coefficients(
     let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
     let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
+    let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
+    let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);
+    // Numbers of holes that a path of the scene may have, for the table's depths.
+    let holes = if openings().any(has_hole) { 3 } else { 1 };
     for source in 0..scene.blocks.len() {
-        let arrivals = match config.coupling {
-            Coupling::Table => table.follow(source),
-            Coupling::Lightfield => {
-                lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)
-            }
+        let (mut arrivals, covered) = match config.coupling {
+            Coupling::Table => (table.follow(source), dictionary.paths.depths()),
+            Coupling::Lightfield => (Arrivals::new(), [0; 3]),
         };
+        if covered[..holes].iter().any(|&d| d < config.max_depth) {
+            let depth = config.max_depth;
+            let rest = lightfield::follow(scene, dictionary, used_shapes, source, depth, covered);
+            for (key, responses) in rest {
+                add(&mut arrivals, key, responses);
+            }
+        }
         for (doors, block, joint) in project(scene, dictionary, used_shapes, arrivals) {
             bytes += std::mem::size_of_val(joint.data());
             if bytes > max_bytes {
@@ -77,6 +88,21 @@ pub(crate) fn joint_from_coefficients(
             })
             .collect(),
     })
+}
+
+/// Adds responses to those that enter at the same place.
+fn add(arrivals: &mut Arrivals, key: ArrivalKey, responses: Matrix<f32>) {
+    match arrivals.entry(key) {
+        Entry::Vacant(entry) => {
+            entry.insert(responses);
+        }
+        Entry::Occupied(mut entry) => {
+            let sum = entry.get_mut().data_mut();
+            for (sum, x) in sum.iter_mut().zip(responses.data()) {
+                *sum += x;
+            }
+        }
+    }
 }
 
 /// Projects responses on the joint bases, and sums those of one block behind the same doors.

@@ -17,7 +17,10 @@ fn small() -> BakeConfig {
     config.lightfield.positions = 4;
     config.lightfield.directions = 8;
     config.lightfield.lightfield_modes = 24;
-    config.lightfield.response_modes = 8;
+    config.coupling.emission_modes = 12;
+    config.coupling.response_modes = 8;
+    config.coupling.foreign_modes = 4;
+    config.coupling.depth = 2;
     config.check().expect("in range");
     config
 }

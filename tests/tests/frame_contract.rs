@@ -7,7 +7,7 @@ use common::{assembled, by_texel, floor_plan, solved, sphere};
 use glam::{DVec3, Vec3};
 use mrt_core::cube::Face;
 use mrt_runtime::frame::{Bounces, Frame, FrameError, MAX_LIGHTS};
-use mrt_runtime::level::Level;
+use mrt_runtime::level::{Door, Level};
 use mrt_runtime::light::{Light, LightError};
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::{Openings, Rays};
@@ -257,9 +257,14 @@ fn buffers_of_another_scene_are_refused() {
     let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(1));
     let before = snapshot(&frame);
     let larger = assembled(&floor_plan(&[[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], 0.6));
-    // As many texels, but fewer responses.
-    let one_door_less = assembled(&level_with_a_door_outside());
-    for other in [&larger, &one_door_less] {
+    // As many of everything, and a door that the frame has no value for.
+    let mut with_a_door = level();
+    with_a_door.doors.push(Door {
+        connection: 0,
+        value: 1.0,
+    });
+    let with_a_door = assembled(&with_a_door);
+    for other in [&larger, &with_a_door] {
         let error = frame
             .solve(other, &[GOOD_SPHERE], &Openings, Bounces::Count(1))
             .expect_err("the buffers are too small or too large");

@@ -6,17 +6,21 @@ use common::{DEFAULT_BYTES, Random, default_dictionary, floor_plan};
 use mrt_core::container::{ByteBudget, ContainerError, Format, Writer};
 use mrt_core::matrix::Matrix;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::dictionary::{Dictionary, InterfaceOperators, ShapeOperators};
-use mrt_runtime::dictionary_file::{
-    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_RESOLUTION,
+use mrt_runtime::dictionary::{
+    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
+    Sources,
 };
-use mrt_runtime::shape::SHAPES;
+use mrt_runtime::dictionary_file::{
+    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES, MAX_RESOLUTION,
+};
+use mrt_runtime::path::Word;
+use mrt_runtime::shape::{Hole, SHAPES};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
     Dictionary::from_bytes(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
 }
 
-/// A dictionary of two shapes with 2² texels and two modes of everything.
+/// A dictionary of two shapes with 2² texels, one probe and two modes of everything; foreign light adds a third.
 fn small() -> Dictionary {
     let filled =
         |rows, columns| Matrix::from_fn(rows, columns, |i, j| (1 + i + 3 * j) as f32 * 0.01);
@@ -27,11 +31,20 @@ fn small() -> Dictionary {
             ShapeOperators {
                 shape,
                 coefficients_from_direct: filled(2, texels),
-                indirect_basis: filled(texels, 2),
+                joint_basis: filled(texels, 3),
+                probe_basis: filled(9, 3),
+                vector_basis: Matrix::zeros(0, 3),
+                openings: vec![
+                    OpeningOperators {
+                        emission_from_coefficients: vec![filled(2, 2)],
+                        joint_from_response: vec![filled(3, 2)],
+                    };
+                    shape.openings.len()
+                ],
                 implicit_lighting: filled(texels, 2),
-                lightfield_from_coefficients: vec![filled(2, 2); shape.openings.len()],
                 singular_values: vec![1.0, 0.5],
                 dropped_energy: 0.1,
+                joint_dropped_energy: 0.05,
             }
         })
         .collect();
@@ -39,16 +52,35 @@ fn small() -> Dictionary {
         preset: "small".to_owned(),
         settings: "made up".to_owned(),
         resolution: 2,
+        probes: 1,
         shapes,
-        interface: InterfaceOperators {
+        lightfields: LightfieldOperators {
+            parity: vec![0, 1],
+            from_emission: filled(2, 2),
             straight: filled(2, 2),
             left: filled(2, 2),
-            right: filled(2, 2),
+            exchange: Matrix::zeros(0, 2),
+            holes: Vec::new(),
             response_from_lightfield: filled(2, 2),
-            response_basis: filled(20, 2),
-            lightfield_dropped_energy: 0.2,
-            response_dropped_energy: 0.3,
+            dropped_energy: 0.2,
         },
+        paths: PathTable {
+            emission_parity: vec![0, 1],
+            response_parity: vec![0, 3],
+            entries: ["z", "zx"]
+                .map(|name| PathEntry {
+                    word: Word::from_name(name).expect("canonical"),
+                    response_from_emission: filled(2, 2),
+                })
+                .to_vec(),
+            emission_dropped_energy: 0.3,
+            response_dropped_energy: 0.4,
+        },
+        variants: Vec::new(),
+        sources: Some(Sources {
+            emission_from_radiosity: filled(2, 20),
+            response_basis: filled(29, 2),
+        }),
     }
 }
 
@@ -57,36 +89,53 @@ fn small() -> Dictionary {
 enum Section {
     Text(&'static str),
     Sizes(Vec<u32>),
+    Parities(Vec<u16>),
     Numbers(Vec<f32>),
 }
 
+/// Resolution, probes, shapes, lightfield, emission and response modes, no vertical openings, no holes.
+const SIZES: [u32; 8] = [2, 1, 2, 2, 2, 2, 0, 0];
+
 /// The sections of [`small`], by the names that the file format gives them.
 fn sections() -> Vec<(&'static str, Section)> {
-    use Section::{Numbers, Sizes, Text};
+    use Section::{Numbers, Parities, Sizes, Text};
     let zeros = |count| Numbers(vec![0.25; count]);
     vec![
         ("preset", Text("small")),
         ("settings", Text("made up")),
-        ("sizes", Sizes(vec![2, 2, 2, 2])),
+        ("sizes", Sizes(SIZES.to_vec())),
+        ("dropped", zeros(3)),
+        ("rlf.par", Parities(vec![0, 1])),
+        ("e_rlf", zeros(4)),
         ("left", zeros(4)),
         ("straight", zeros(4)),
-        ("right", zeros(4)),
+        ("exchange", zeros(0)),
         ("T_rlf_r", zeros(4)),
-        ("U_r", zeros(40)),
-        ("dropped", zeros(2)),
+        ("words", Text("z zx")),
+        ("e.par", Parities(vec![0, 1])),
+        ("r.par", Parities(vec![0, 3])),
+        ("P0", zeros(4)),
+        ("P1", zeros(4)),
         ("0.name", Text("closed")),
         ("0.sigma", zeros(2)),
         ("0.T_d_b", zeros(48)),
-        ("0.U_b", zeros(48)),
+        ("0.J", zeros(72)),
+        ("0.J_prb", zeros(27)),
+        ("0.J_vec", zeros(0)),
         ("0.L_imp", zeros(48)),
-        ("0.drop", zeros(1)),
+        ("0.drop", zeros(2)),
         ("1.name", Text("dead_end")),
         ("1.sigma", zeros(2)),
         ("1.T_d_b", zeros(40)),
-        ("1.U_b", zeros(40)),
+        ("1.J", zeros(60)),
+        ("1.J_prb", zeros(27)),
+        ("1.J_vec", zeros(0)),
         ("1.L_imp", zeros(40)),
-        ("1.drop", zeros(1)),
-        ("1.R0", zeros(4)),
+        ("1.drop", zeros(2)),
+        ("1.E0", zeros(4)),
+        ("1.Q0", zeros(6)),
+        ("B_e", zeros(40)),
+        ("U_r", zeros(58)),
     ]
 }
 
@@ -102,6 +151,7 @@ fn packed(sections: &[(&str, Section)]) -> Vec<u8> {
         match section {
             Section::Text(text) => writer.add_text(name, text),
             Section::Sizes(numbers) => writer.add_numbers(name, numbers),
+            Section::Parities(numbers) => writer.add_numbers(name, numbers),
             Section::Numbers(numbers) => writer.add_numbers(name, numbers),
         }
         .expect("the names are legal");
@@ -198,11 +248,8 @@ fn another_version_is_refused_by_its_number() {
     let error = read(&writer.finish()).expect_err("too new");
     let version = matches!(
         error,
-        DictionaryError::Container(ContainerError::UnsupportedVersion {
-            found: 2,
-            newest: 1,
-            ..
-        })
+        DictionaryError::Container(ContainerError::UnsupportedVersion { found, newest, .. })
+            if found == DICTIONARY_VERSION + 1 && newest == DICTIONARY_VERSION
     );
     assert!(version, "{error}");
 }
@@ -210,18 +257,22 @@ fn another_version_is_refused_by_its_number() {
 #[test]
 fn absurd_sizes_are_refused_by_name() {
     let huge = u32::MAX;
-    for (k, what) in [
-        "resolution",
-        "number of shapes",
-        "number of lightfield modes",
-        "number of response modes",
+    for (k, (what, low, high)) in [
+        ("resolution", 1, MAX_RESOLUTION),
+        ("number of probes along an edge", 0, MAX_PROBES),
+        ("number of shapes", 1, SHAPES.len()),
+        ("number of lightfield modes", 1, MAX_MODES),
+        ("number of emission modes", 1, MAX_MODES),
+        ("number of response modes", 1, MAX_MODES),
+        ("mark of vertical openings", 0, 1),
+        ("number of holes", 0, Hole::ALL.len()),
     ]
     .into_iter()
     .enumerate()
     {
-        let above = [MAX_RESOLUTION, SHAPES.len(), MAX_MODES, MAX_MODES][k] as u32 + 1;
-        for size in [0, above, huge] {
-            let mut sizes = vec![2; 4];
+        let below = (low > 0).then_some(0);
+        for size in below.into_iter().chain([high as u32 + 1, huge]) {
+            let mut sizes = SIZES.to_vec();
             sizes[k] = size;
             match read(&with("sizes", Section::Sizes(sizes))).expect_err("absurd") {
                 DictionaryError::Size {
@@ -233,41 +284,48 @@ fn absurd_sizes_are_refused_by_name() {
             }
         }
     }
-    let no_modes = with("0.sigma", Section::Numbers(Vec::new()));
-    let error = read(&no_modes).expect_err("no modes");
-    assert!(
-        matches!(error, DictionaryError::Size { found: 0, .. }),
-        "{error}"
-    );
+    // More joint modes than the limit, and fewer than the shape's own.
+    for joint in [MAX_MODES + 1, 1] {
+        let basis = Section::Numbers(vec![0.25; 24 * joint]);
+        let error = read(&with("0.J", basis)).expect_err("absurd");
+        assert!(
+            matches!(error, DictionaryError::Size { found, .. } if found == joint),
+            "{error}"
+        );
+    }
 }
 
 #[test]
 fn sections_of_the_wrong_length_or_type_are_refused() {
+    let decides = |name: &str| name.ends_with("sigma") || name.ends_with(".J");
     for (name, section) in sections() {
         let (shorter, longer, other) = match section {
             Section::Text(_) => continue,
+            Section::Parities(parities) => (
+                Section::Parities(parities[1..].to_vec()),
+                Section::Parities([&parities[..], &[1]].concat()),
+                Section::Numbers(vec![1.0; parities.len()]),
+            ),
             Section::Sizes(sizes) => (
                 Section::Sizes(sizes[1..].to_vec()),
                 Section::Sizes([&sizes[..], &[1]].concat()),
                 Section::Numbers(vec![2.0; 4]),
             ),
             Section::Numbers(numbers) => (
-                Section::Numbers(numbers[1..].to_vec()),
+                Section::Numbers(numbers.get(1..).unwrap_or(&[1.0; 2]).to_vec()),
                 Section::Numbers([&numbers[..], &[1.0]].concat()),
                 Section::Sizes(vec![1; numbers.len()]),
             ),
         };
         for section in [shorter, longer] {
             match read(&with(name, section)) {
-                // The number of modes follows from `sigma`, so another matrix is then the wrong one.
+                // The number of modes follows from `sigma` and that of joint modes from the basis, so another
+                // matrix is then the wrong one.
                 Err(DictionaryError::Length { section, .. }) => {
-                    assert!(
-                        section == name || name.ends_with("sigma"),
-                        "{name}: {section}"
-                    );
+                    assert!(section == name || decides(name), "{name}: {section}");
                 }
-                // Other modes than the matrices have, down to none.
-                Err(DictionaryError::Size { .. }) if name.ends_with("sigma") => {}
+                // Other modes than the matrices have.
+                Err(DictionaryError::Size { .. }) if decides(name) => {}
                 other => panic!("{name}: {other:?}"),
             }
         }
@@ -282,6 +340,10 @@ fn sections_of_the_wrong_length_or_type_are_refused() {
 #[test]
 fn missing_sections_are_refused_by_name() {
     for (k, (name, _)) in sections().into_iter().enumerate() {
+        // Without it the dictionary is a packed one.
+        if name == "B_e" {
+            continue;
+        }
         let mut all = sections();
         all.remove(k);
         match read(&packed(&all)) {
@@ -301,7 +363,10 @@ fn numbers_that_are_none_are_refused() {
         };
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let mut numbers = numbers.clone();
-            *numbers.last_mut().expect("not empty") = bad;
+            match numbers.last_mut() {
+                Some(last) => *last = bad,
+                None => numbers.push(bad),
+            }
             let error = read(&with(name, Section::Numbers(numbers))).expect_err("not finite");
             let malformed = matches!(
                 error,
@@ -328,6 +393,41 @@ fn unknown_and_repeated_shapes_are_refused() {
         matches!(error, DictionaryError::ShapeTwice { found: "dead_end" }),
         "{error}"
     );
+}
+
+#[test]
+fn words_and_parities_that_are_none_are_refused() {
+    for words in [
+        "x",
+        "zy",
+        "z z",
+        "zx z",
+        "zdd",
+        "q",
+        "zzzzzzzzzzzzz",
+        "z zx z",
+    ] {
+        let error = read(&with("words", Section::Text(words))).expect_err(words);
+        assert!(
+            matches!(error, DictionaryError::Word { .. }),
+            "{words}: {error}"
+        );
+    }
+    for name in ["rlf.par", "e.par", "r.par"] {
+        let error = read(&with(name, Section::Parities(vec![0, 4]))).expect_err(name);
+        assert!(
+            matches!(&error, DictionaryError::Parity { section, found: 4 } if section == name),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn a_closed_cube_alone_is_a_dictionary() {
+    let mut alone = small();
+    alone.shapes.truncate(1);
+    let bytes = alone.to_bytes().expect("it fits");
+    assert_eq!(read(&bytes).expect("sound"), alone);
 }
 
 #[test]
@@ -358,7 +458,9 @@ fn a_dictionary_that_lacks_a_shape_says_which() {
     let mut packed = default_dictionary().clone();
     packed.shapes.retain(|entry| entry.shape.name != "straight");
     let level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-    let error = assemble(&level, &packed, &AssembleConfig::default()).expect_err("incomplete");
+    let error = assemble(&level, &packed, &AssembleConfig::default())
+        .map(|_| ())
+        .expect_err("incomplete");
     let missing = matches!(
         error,
         AssembleError::MissingShape {

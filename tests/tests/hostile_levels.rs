@@ -148,18 +148,15 @@ fn connections_that_make_no_sense_have_a_name() {
 }
 
 #[test]
-fn rolled_interfaces_are_refused() {
+fn interfaces_rolled_by_a_quarter_turn_are_refused() {
     // About the corridor's axis: the openings stay where they are, up does not.
-    for (x, y) in [
-        (Face::NegX, Face::PosZ),
-        (Face::NegX, Face::NegY),
-        (Face::NegX, Face::NegZ),
-    ] {
+    for (x, y) in [(Face::NegX, Face::PosZ), (Face::NegX, Face::NegZ)] {
         let mut level = pair();
         level.blocks[1].orientation = CubeRotation::from_images(x, y).expect("perpendicular");
         assert_eq!(level.check(), Ok(()));
-        let error =
-            assemble(&level, default_dictionary(), &AssembleConfig::default()).expect_err("rolled");
+        let error = assemble(&level, default_dictionary(), &AssembleConfig::default())
+            .map(|_| ())
+            .expect_err("rolled");
         let named = matches!(
             error,
             AssembleError::RolledInterface {
@@ -343,9 +340,12 @@ fn far_levels_and_endless_depths_are_refused() {
     let config = |max_depth, max_bytes| AssembleConfig {
         max_depth,
         max_bytes,
+        ..AssembleConfig::default()
     };
     let refused = |level: &Level, config| {
-        assemble(level, default_dictionary(), &config).expect_err("refused")
+        assemble(level, default_dictionary(), &config)
+            .map(|_| ())
+            .expect_err("refused")
     };
     assert!(matches!(
         refused(&level, config(usize::MAX, 1 << 30)),

@@ -252,6 +252,23 @@ fn light_is_linear_in_intensity() {
 }
 
 #[test]
+fn a_block_may_stand_on_its_head() {
+    let mut level = painted(&[[0, 0], [1, 0], [2, 0]]);
+    let (scene, expected) = indirect(&level, &two_lights()[..1], TEN);
+    let upright = level.blocks[1].orientation;
+    // A half turn about the corridor's axis leaves a straight block's openings where they are.
+    let along = upright.face(Face::PosX);
+    let up = upright.face(Face::PosY);
+    level.blocks[1].orientation =
+        CubeRotation::from_images(along, up.opposite()).expect("a rotation");
+    let (other, found) = indirect(&level, &two_lights()[..1], TEN);
+    let found = matched(&scene, &other, &found, |p| p);
+    let apart = largest_difference(&found, &expected);
+    println!("on its head: {apart:.2e}");
+    assert!(apart < ROUNDING, "{apart}");
+}
+
+#[test]
 fn lights_add_up() {
     let level = painted(&CELLS);
     let lights = two_lights();

@@ -307,7 +307,7 @@ fn creases_and_outside_openings_repeat_the_edge() {
 #[test]
 fn coordinates_outside_a_wall_are_clamped_and_openings_have_none() {
     let (_, scene, _) = lit();
-    let opening = scene.blocks[0].shape.openings[0];
+    let opening = scene.blocks[0].shape.openings[0].face;
     assert_eq!(scene.atlas.pixel(0, opening, 0.5, 0.5), None);
     assert_eq!(
         scene.atlas.pixel(scene.blocks.len(), Face::NegY, 0.5, 0.5),

@@ -251,7 +251,6 @@ fn reduced_operators_follow_the_full_ones() {
         positions: 6,
         directions: 12,
         lightfield_modes: 48,
-        response_modes: 16,
         ..LightfieldConfig::default()
     };
     let grid = LightfieldGrid::new(&config);
@@ -290,7 +289,7 @@ fn reduced_operators_follow_the_full_ones() {
         }
         let field = &columns[0].columns_view(0..1);
         let field = Matrix::from_column_major(field.rows(), 1, field.data().to_vec());
-        let coefficients = lightfield_from_coefficients(&basis, &field);
+        let coefficients = lightfield_coefficients(&basis, &field);
         let response =
             mrt_core::matrix::multiply(a.response_from_lightfield.view(), coefficients.view());
         let found = mrt_core::matrix::multiply(a.response_basis.view(), response.view());
@@ -325,7 +324,7 @@ fn whole_set() {
         lap("prior");
         let folded = fold_bounce(&weights.weigh_operator(&bounce), &classes);
         lap("fold");
-        let transport = block_transport(&folded, &prior.basis, &classes, modes);
+        let transport = block_transport(&folded, &folded, &prior.basis, &classes, modes);
         let transport = weights.unweigh_transport(transport);
         lap("transport");
         println!("dropped energy {:.2e}", transport.dropped_energy);

@@ -1,8 +1,9 @@
 //! `mrt accuracy`: error of the reduced solution against reference files.
 
-use crate::dictionary_source::{SourceError, load};
+use crate::dictionary_source::{DEFAULT_PRESET, DEFAULT_SET, SourceError, from_file, from_preset};
 use crate::table::Table;
 use glam::{DVec3, Vec3};
+use mrt_dictionary::config::BakeConfig;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::{Bounces, Frame, FrameError, Outputs};
@@ -27,8 +28,11 @@ pub struct AccuracyArgs {
     /// Dictionary preset: mobile, standard or quality; all but standard are baked first.
     #[arg(long)]
     pub preset: Option<String>,
+    /// Set of shapes of the preset [default: cubes-2d, and cubes-3d for references with cells one above another].
+    #[arg(long)]
+    pub set: Option<String>,
     /// Dictionary file, instead of a preset.
-    #[arg(long, conflicts_with = "preset")]
+    #[arg(long, conflicts_with_all = ["preset", "set"])]
     pub dictionary: Option<PathBuf>,
     /// Which bounces to compare.
     #[arg(long, value_enum, default_value = "first")]
@@ -168,13 +172,18 @@ pub struct LightAccuracy {
 /// [`AccuracyError`].
 pub fn run(args: &AccuracyArgs) -> Result<(), AccuracyError> {
     check_albedo(args)?;
-    let dictionary = load(args.dictionary.as_deref(), args.preset.as_deref())?;
+    let mut dictionaries = Dictionaries::new(args)?;
     let mut all = Vec::new();
     let mut failed = 0;
     for path in &args.references {
-        let result = read(path)
-            .map_err(AccuracyError::from)
-            .and_then(|reference| compare(&reference, &dictionary, args));
+        let result = match read(path) {
+            Err(error) => Err(AccuracyError::from(error)),
+            Ok(reference) => {
+                // Without a dictionary nothing can be compared.
+                let dictionary = dictionaries.of(&reference)?;
+                compare(&reference, dictionary, args)
+            }
+        };
         match result {
             Err(error) => {
                 eprintln!("mrt: {error}");
@@ -200,6 +209,55 @@ pub fn run(args: &AccuracyArgs) -> Result<(), AccuracyError> {
             count: args.references.len(),
         }),
     }
+}
+
+/// The dictionaries of a comparison; those of a preset are made when a reference first needs them.
+struct Dictionaries<'a> {
+    args: &'a AccuracyArgs,
+    /// By set of shapes; a file's stands for all.
+    loaded: Vec<(String, Dictionary)>,
+}
+
+/// The set for levels that open upwards.
+const VERTICAL_SET: &str = "cubes-3d";
+
+impl<'a> Dictionaries<'a> {
+    /// Reads the file or checks the preset's name, so that neither fails later.
+    fn new(args: &'a AccuracyArgs) -> Result<Self, SourceError> {
+        let mut loaded = Vec::new();
+        if let Some(file) = &args.dictionary {
+            loaded.push((DEFAULT_SET.to_owned(), from_file(file)?));
+        } else {
+            let mut config = BakeConfig::preset(args.preset.as_deref().unwrap_or(DEFAULT_PRESET))?;
+            config.shapes = args.set.clone().unwrap_or(config.shapes);
+            config.check()?;
+        }
+        Ok(Self { args, loaded })
+    }
+
+    fn of(&mut self, reference: &ReferenceFile) -> Result<&Dictionary, SourceError> {
+        let set = match (&self.args.dictionary, &self.args.set) {
+            (None, Some(set)) => set.as_str(),
+            (None, None) if opens_upwards(&reference.cells) => VERTICAL_SET,
+            _ => DEFAULT_SET,
+        };
+        let position = match self.loaded.iter().position(|(name, _)| name == set) {
+            Some(position) => position,
+            None => {
+                let dictionary = from_preset(set, self.args.preset.as_deref())?;
+                self.loaded.push((set.to_owned(), dictionary));
+                self.loaded.len() - 1
+            }
+        };
+        Ok(&self.loaded[position].1)
+    }
+}
+
+/// True when some cell stands on another.
+fn opens_upwards(cells: &[[i32; 3]]) -> bool {
+    cells
+        .iter()
+        .any(|&[x, y, z]| y.checked_add(1).is_some_and(|y| cells.contains(&[x, y, z])))
 }
 
 fn check_albedo(args: &AccuracyArgs) -> Result<(), AccuracyError> {

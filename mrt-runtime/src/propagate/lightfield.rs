@@ -32,18 +32,22 @@ struct WaveKey {
     frame: CubeSymmetry,
     /// Image of +x and +y of the entered block in the source's frame.
     turn: [Face; 2],
+    /// Holes passed so far, two standing for more.
+    holes: usize,
     doors: Vec<u32>,
 }
 
 type Front = BTreeMap<WaveKey, Wave>;
 
-/// The sum of all light of a block that enters others.
+/// The sum of all light of a block that enters others, but for paths of up to `covered` openings, which is by the
+/// number of holes on the way (two standing for more).
 pub(super) fn follow(
     scene: &Scene,
     dictionary: &Dictionary,
     used_shapes: &[usize],
     source: usize,
     max_depth: usize,
+    covered: [usize; 3],
 ) -> Arrivals {
     let fields = &dictionary.lightfields;
     let block = &scene.blocks[source];
@@ -56,6 +60,7 @@ pub(super) fn follow(
             source_from_here: CubeRotation::IDENTITY,
             frame: frame_of_heading(aperture.face),
             headings: 0,
+            holes: 0,
             doors: &[],
             lightfield: multiply(
                 fields.from_emission.view(),
@@ -68,19 +73,22 @@ pub(super) fn follow(
     for depth in 1..=max_depth {
         let mut next = Front::new();
         for (key, wave) in front {
-            let responses = multiply(
-                fields.response_from_lightfield.view(),
-                wave.lightfield.view(),
-            );
-            let target_frame = CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
-            arrive(
-                &mut arrivals,
-                &key.doors,
-                (key.block, key.entered),
-                target_frame,
-                &dictionary.paths.response_parity,
-                &responses,
-            );
+            if depth > covered[key.holes] {
+                let responses = multiply(
+                    fields.response_from_lightfield.view(),
+                    wave.lightfield.view(),
+                );
+                let target_frame =
+                    CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
+                arrive(
+                    &mut arrivals,
+                    &key.doors,
+                    (key.block, key.entered),
+                    target_frame,
+                    &dictionary.paths.response_parity,
+                    &responses,
+                );
+            }
             if depth == max_depth {
                 continue;
             }
@@ -99,6 +107,7 @@ pub(super) fn follow(
                     source_from_here: wave.source_from_here,
                     frame,
                     headings: key.headings,
+                    holes: key.holes,
                     doors: &key.doors,
                     lightfield,
                 };
@@ -154,6 +163,7 @@ struct Sent<'a> {
     source_from_here: CubeRotation,
     frame: CubeSymmetry,
     headings: u8,
+    holes: usize,
     doors: &'a [u32],
     lightfield: Matrix<f32>,
 }
@@ -193,6 +203,7 @@ fn cross(front: &mut Front, scene: &Scene, fields: &LightfieldOperators, sent: S
         headings: sent.headings | 1 << heading.index(),
         frame,
         turn: [Face::PosX, Face::PosY].map(|face| source_from_here.face(face)),
+        holes: (sent.holes + usize::from(hole.is_some())).min(2),
         doors: with_door(sent.doors, here.doors[sent.exit.index()]),
     };
     match front.get_mut(&key) {

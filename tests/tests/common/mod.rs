@@ -14,6 +14,7 @@ use mrt_runtime::level::Level;
 use mrt_runtime::light::Light;
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::Openings;
+use mrt_tests::exact::{ExactScene, Side};
 use std::sync::OnceLock;
 
 /// The committed default dictionary.
@@ -154,6 +155,42 @@ pub fn texel_areas(scene: &Scene) -> Vec<f64> {
         }
     }
     areas
+}
+
+/// The exact solver's scene of a level of whole openings; openings without a connection lead to the sky.
+pub fn exact_of(level: &Level, resolution: usize) -> ExactScene {
+    let neighbours = level.neighbours();
+    let sides = level
+        .blocks
+        .iter()
+        .enumerate()
+        .map(|(index, block)| {
+            Face::ALL.map(|face| match neighbours[index][face.index()] {
+                Some(there) => Side::Opening(there.block, there.face),
+                None if block.is_open(face) => Side::Sky,
+                None => Side::Wall,
+            })
+        })
+        .collect();
+    let blocks = level
+        .blocks
+        .iter()
+        .map(|block| block.warp.clone())
+        .collect();
+    ExactScene::new(blocks, sides, resolution).expect("the level is sound")
+}
+
+/// A connected heap of cells, grown from (0, 0) by random steps.
+pub fn random_cells(random: &mut Random, count: usize) -> Vec<[i32; 2]> {
+    let mut cells = vec![[0, 0]];
+    while cells.len() < count {
+        let [x, z] = cells[random.below(cells.len())];
+        let next = [[x + 1, z], [x - 1, z], [x, z + 1], [x, z - 1]][random.below(4)];
+        if !cells.contains(&next) {
+            cells.push(next);
+        }
+    }
+    cells
 }
 
 /// SplitMix64: numbers for tests that must be the same everywhere, forever.
