@@ -10,8 +10,10 @@
 mod lightfield;
 mod table;
 
+pub(crate) use table::used_paths;
+
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, OperatorMatrix};
 use crate::path::Roll;
 use crate::scene::{Gate, Scene, Transport};
 use mrt_core::block_sparse::BlockSparse;
@@ -38,19 +40,24 @@ struct ArrivalKey {
 /// Assembles the operator from all blocks' coefficients b to all blocks' joint coefficients.
 pub(crate) fn joint_from_coefficients(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     used_shapes: &[usize],
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
     let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
+    let fields = match config.coupling {
+        Coupling::Table => None,
+        Coupling::Lightfield => Some(dictionary.lightfields.decode()),
+    };
     let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
     for source in 0..scene.blocks.len() {
-        let arrivals = match config.coupling {
-            Coupling::Table => table.follow(source),
-            Coupling::Lightfield => {
-                lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)
+        let arrivals = match &fields {
+            None => table.follow(source)?,
+            Some(fields) => {
+                let depth = config.max_depth;
+                lightfield::follow(scene, dictionary, fields, used_shapes, source, depth)
             }
         };
         for (doors, block, joint) in project(scene, dictionary, used_shapes, arrivals) {
@@ -82,7 +89,7 @@ pub(crate) fn joint_from_coefficients(
 /// Projects responses on the joint bases, and sums those of one block behind the same doors.
 fn project(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     used_shapes: &[usize],
     arrivals: Arrivals,
 ) -> Vec<(Vec<u32>, usize, Matrix<f32>)> {
@@ -103,6 +110,7 @@ fn project(
             // Assembly refuses rolled interfaces that the dictionary has no operators for.
             continue;
         };
+        let operator = operator.decode();
         match sums.last_mut() {
             Some((doors, block, sum)) if *block == key.block && *doors == key.doors => {
                 multiply_add(operator.view(), responses.view(), sum.data_mut());

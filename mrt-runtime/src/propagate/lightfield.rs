@@ -4,7 +4,7 @@
 //! open rooms have binomially many.
 
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, LightfieldOperators};
+use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix};
 use crate::path::{Roll, frame_of_heading, hole_of};
 use crate::scene::{Beyond, Scene};
 use mrt_core::cube::{CubeRotation, Face};
@@ -37,15 +37,15 @@ struct WaveKey {
 
 type Front = BTreeMap<WaveKey, Wave>;
 
-/// The sum of all light of a block that enters others.
+/// The sum of all light of a block that enters others; `fields` are the dictionary's, decoded.
 pub(super) fn follow(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
+    fields: &LightfieldOperators,
     used_shapes: &[usize],
     source: usize,
     max_depth: usize,
 ) -> Arrivals {
-    let fields = &dictionary.lightfields;
     let block = &scene.blocks[source];
     let emission = &dictionary.shapes[used_shapes[block.shape_index]].openings;
     let mut front = Front::new();
@@ -59,7 +59,7 @@ pub(super) fn follow(
             doors: &[],
             lightfield: multiply(
                 fields.from_emission.view(),
-                operators.emission_from_coefficients[0].view(),
+                operators.emission_from_coefficients[0].decode().view(),
             ),
         };
         cross(&mut front, scene, fields, sent);
