@@ -135,21 +135,43 @@ impl OperatorKind {
         }
     }
 
-    /// Which lines share a scale: columns of bases, rows of operators that give coefficients.
+    /// Which lines share a scale: columns of bases, rows of operators that give coefficients. What a shape emits
+    /// counts as a basis: scales an emission mode would let errors of the strong modes reach the weak ones, which are
+    /// those that get far (2.4 % of the light against 0.05 %, in `int8`).
     pub const fn modes(self) -> ModeAxis {
         match self {
             OperatorKind::JointBasis
             | OperatorKind::ProbeBasis
             | OperatorKind::VectorBasis
             | OperatorKind::ImplicitLighting
+            | OperatorKind::Emission
             | OperatorKind::ResponseSource => ModeAxis::Columns,
             _ => ModeAxis::Rows,
         }
     }
 
-    /// How matrices of this kind are stored in a dictionary that is to be stored as `storage`.
+    /// How matrices of this kind are stored in a dictionary that is to be stored as `storage`: as it says, but for
+    /// two small kinds that are `f16` in dictionaries of `int8`.
+    ///
+    /// Chosen by the error of light: relative L2 of indirect irradiance over a level, worst of four light sets on
+    /// four levels (maze, corridor, cube, room; one and four bounces), with the preset `standard`:
+    ///
+    /// | stored as `int8`, the rest as `f32` | error | bytes saved |
+    /// | --- | --- | --- |
+    /// | bases | 0.45 % | 15 % |
+    /// | `T_d->b` | 0.13 % | 11 % |
+    /// | responses | 0.17 % | 2 % |
+    /// | emission | 0.12 % | 2 % |
+    /// | paths | 0.09 % | 10 % |
+    ///
+    /// Errors add up as squares, so all of them make 0.52 %; without the two that save least it is 0.47 %.
     pub const fn storage(self, storage: Storage) -> Storage {
-        storage
+        match (self, storage) {
+            (OperatorKind::Emission | OperatorKind::JointFromResponse, Storage::Int8) => {
+                Storage::F16
+            }
+            _ => storage,
+        }
     }
 }
 
