@@ -152,6 +152,39 @@ impl StoredMatrix<'static> {
 }
 
 impl<'a> StoredMatrix<'a> {
+    /// The matrix as it is, in `f32`, without a copy.
+    ///
+    /// # Panics
+    /// If an element is infinite or not a number.
+    pub fn of(matrix: &'a Matrix<f32>, modes: ModeAxis) -> Self {
+        assert!(
+            matrix.data().iter().all(|x| x.is_finite()),
+            "a matrix to store must be finite"
+        );
+        StoredMatrix {
+            rows: matrix.rows(),
+            columns: matrix.columns(),
+            modes,
+            values: CowValues::F32(Cow::Borrowed(matrix.data())),
+            scales: Cow::Borrowed(&[]),
+        }
+    }
+
+    /// The same matrix without a copy.
+    pub fn borrowed(&self) -> StoredMatrix<'_> {
+        StoredMatrix {
+            rows: self.rows,
+            columns: self.columns,
+            modes: self.modes,
+            values: match self.values() {
+                Values::F32(values) => CowValues::F32(Cow::Borrowed(values)),
+                Values::F16(values) => CowValues::F16(Cow::Borrowed(values)),
+                Values::Int8(values) => CowValues::Int8(Cow::Borrowed(values)),
+            },
+            scales: Cow::Borrowed(self.scales()),
+        }
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows

@@ -47,16 +47,13 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
     }
     step("paths through openings")?;
     let emission = emission(&shapes, &transports, config, &set);
-    let words = Word::all(
-        config.coupling.depth,
-        if set.holes.is_empty() {
-            0
-        } else {
-            config.coupling.hole_depth
-        },
-        &set.holes,
-        set.has_exchanges,
-    );
+    let hole_depth = if set.holes.is_empty() {
+        0
+    } else {
+        config.coupling.hole_depth
+    };
+    let depths = [config.coupling.depth, hole_depth];
+    let words = Word::all(depths[0], depths[1], &set.holes, set.has_exchanges);
     let gather = Gather {
         resolution: config.resolution,
         probes: config.outputs.probes,
@@ -112,7 +109,7 @@ pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Canc
         variants: Vec::new(),
         lightfields: pack_lightfields(&basis, &interface),
         sources: Some(pack_sources(&emission, &response, config.resolution)),
-        paths: pack_paths(words, &emission, response),
+        paths: pack_paths(words, depths, &emission, response),
     })
 }
 
@@ -277,7 +274,12 @@ fn pack_sources(emission: &EmissionBasis, response: &ResponseBasis, resolution: 
     }
 }
 
-fn pack_paths(words: Vec<Word>, emission: &EmissionBasis, response: ResponseBasis) -> PathTable {
+fn pack_paths(
+    words: Vec<Word>,
+    [depth, hole_depth]: [usize; 2],
+    emission: &EmissionBasis,
+    response: ResponseBasis,
+) -> PathTable {
     let mut entries: Vec<PathEntry> = words
         .into_iter()
         .zip(&response.paths)
@@ -290,6 +292,8 @@ fn pack_paths(words: Vec<Word>, emission: &EmissionBasis, response: ResponseBasi
     PathTable {
         emission_parity: emission.parity.clone(),
         response_parity: response.parity,
+        depth,
+        hole_depth,
         entries,
         emission_dropped_energy: emission.dropped_energy as f32,
         response_dropped_energy: response.dropped_energy as f32,

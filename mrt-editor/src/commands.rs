@@ -6,3 +6,4 @@ pub mod demo;
 pub mod info;
 pub mod light;
 pub mod map;
+pub mod pack;

@@ -77,17 +77,24 @@ pub fn from_preset(set: &str, preset: Option<&str>) -> Result<Dictionary, Source
 /// # Errors
 /// [`SourceError::File`] and [`SourceError::Dictionary`].
 pub fn from_file(path: &Path) -> Result<Dictionary, SourceError> {
-    let place = path.display().to_string();
+    let bytes = read_dictionary_file(path)?;
+    parse(&bytes, path.display().to_string())
+}
+
+/// The bytes of a file that may be a dictionary.
+///
+/// # Errors
+/// [`SourceError::File`] and [`SourceError::Dictionary`].
+pub fn read_dictionary_file(path: &Path) -> Result<Vec<u8>, SourceError> {
     let bytes = read_file(path, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET));
-    let bytes = bytes.map_err(|error| match error {
+    bytes.map_err(|error| match error {
         // These name the file themselves.
         ContainerError::Io { .. } => SourceError::File(error),
         other => SourceError::Dictionary {
-            place: place.clone(),
+            place: path.display().to_string(),
             source: other.into(),
         },
-    })?;
-    parse(&bytes, place)
+    })
 }
 
 fn parse(bytes: &[u8], place: String) -> Result<Dictionary, SourceError> {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const COMMANDS: [&str; 6] = ["demo", "bake", "info", "accuracy", "map", "light"];
+const COMMANDS: [&str; 7] = ["demo", "bake", "info", "accuracy", "map", "light", "pack"];
 
 /// A room of 2 x 2 x 2 m, its faces turned inwards.
 const ROOM_OBJ: &str = "\
@@ -572,4 +572,43 @@ fn light_writes_all_files_or_none() {
         assert!(written.iter().any(|name| name == expected), "{written:?}");
     }
     assert_eq!(names(folder.path()), ["out", "room.obj", "room.toml"]);
+}
+
+#[test]
+fn a_packed_dictionary_is_a_smaller_file() {
+    let folder = folder();
+    fs::write(folder.path().join("room.toml"), ROOM_LEVEL).expect("writable");
+    let pack = [
+        "pack",
+        "room.toml",
+        "--out",
+        "room.mrt",
+        "--storage",
+        "int8",
+        "--json",
+    ];
+    let output = mrt(&folder, &pack);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(report["shapes"], serde_json::json!(["closed"]));
+    let bytes = fs::metadata(folder.path().join("room.mrt"))
+        .expect("written")
+        .len();
+    assert_eq!(report["file_bytes"], bytes);
+    assert!(
+        10 * bytes < report["file_bytes_before"].as_u64().expect("a number"),
+        "{report}"
+    );
+    let info = mrt(&folder, &["info", "room.mrt"]);
+    assert!(
+        text(&info.stdout).contains("int8"),
+        "{}",
+        text(&info.stderr)
+    );
+    fs::remove_file(folder.path().join("room.mrt")).expect("it is there");
+    assert_refused(
+        &mrt(&folder, &["pack", "none.toml", "--out", "room.mrt"]),
+        "none.toml",
+    );
+    assert_eq!(names(folder.path()), ["room.toml"]);
 }

@@ -1,7 +1,7 @@
 //! Joins a level and a dictionary into a scene (Loos et al. 2011, sections 6.2 and 6.3).
 
 use crate::atlas::AtlasLayout;
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, OperatorMatrix};
 use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::path::hole_of;
 use crate::propagate;
@@ -24,7 +24,8 @@ pub struct AssembleConfig {
 /// How light is taken from block to block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Coupling {
-    /// By the dictionary's operator of each whole path of openings.
+    /// By the dictionary's operator of each whole path of openings; by lightfields with a dictionary that was baked
+    /// without a table, as those of format version 1 were.
     #[default]
     Table,
     /// By lightfields passed on from opening to opening, as in the paper.
@@ -64,6 +65,25 @@ pub enum AssembleError {
         /// Shapes in the dictionary.
         expected: String,
     },
+    /// The dictionary was packed for levels without such a path.
+    #[error(
+        "block {block}: light that leaves through face {face} goes the way `{word}`, for which the dictionary has \
+         no operator; expected one packed for this level (mrt pack)"
+    )]
+    MissingPath {
+        /// Where it comes from.
+        block: usize,
+        /// The first face that it crosses, after orientation.
+        face: Face,
+        /// The path, as [`Word::name`](crate::path::Word::name) writes it.
+        word: String,
+    },
+    /// The dictionary was packed without lightfields, or has neither these nor a path table.
+    #[error(
+        "the level joins blocks by lightfields; found none in the dictionary, expected one with them (packed \
+         without --coupling table)"
+    )]
+    MissingLightfields,
     /// More openings than paths are followed through.
     #[error("light may cross {found} openings; expected at most {MAX_DEPTH}")]
     Depth {
@@ -100,7 +120,9 @@ pub enum AssembleError {
     },
 }
 
-/// Checks the level, looks up its shapes and assembles `T_b->r`.
+/// Checks the level, looks up its shapes and assembles `T_b->r`. Of a
+/// [`StoredDictionary`](crate::dictionary::StoredDictionary), what the level uses is decoded; the scene borrows
+/// nothing.
 ///
 /// Cost: a k_rlf x k_rlf x k_b product for each opening that each block's light crosses.
 ///
@@ -108,7 +130,7 @@ pub enum AssembleError {
 /// [`AssembleError`].
 pub fn assemble(
     level: &Level,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     config: &AssembleConfig,
 ) -> Result<Scene, AssembleError> {
     level.check()?;
@@ -118,6 +140,10 @@ pub fn assemble(
         });
     }
     let used = used_shapes(level, dictionary)?;
+    let config = &AssembleConfig {
+        coupling: usable_coupling(level, dictionary, config.coupling)?,
+        ..config.clone()
+    };
     let blocks = place_blocks(level, dictionary, &used)?;
     let resolution = dictionary.resolution;
     let texel_bytes = BYTES_PER_TEXEL * blocks.last().map_or(0, |b| b.texels.end);
@@ -156,8 +182,26 @@ pub fn assemble(
     Ok(scene)
 }
 
+/// The coupling asked for, or lightfields where the dictionary never had a table.
+pub(crate) fn usable_coupling<M>(
+    level: &Level,
+    dictionary: &Dictionary<M>,
+    asked: Coupling,
+) -> Result<Coupling, AssembleError> {
+    if asked == Coupling::Table && dictionary.paths.depth > 0 {
+        return Ok(Coupling::Table);
+    }
+    if dictionary.lightfields.parity.is_empty() && !level.connections.is_empty() {
+        return Err(AssembleError::MissingLightfields);
+    }
+    Ok(Coupling::Lightfield)
+}
+
 /// Dictionary positions of the shapes that the level uses, in dictionary order.
-fn used_shapes(level: &Level, dictionary: &Dictionary) -> Result<Vec<usize>, AssembleError> {
+pub(crate) fn used_shapes<M>(
+    level: &Level,
+    dictionary: &Dictionary<M>,
+) -> Result<Vec<usize>, AssembleError> {
     let mut used = vec![false; dictionary.shapes.len()];
     for (index, block) in level.blocks.iter().enumerate() {
         let position =
@@ -178,9 +222,9 @@ fn used_shapes(level: &Level, dictionary: &Dictionary) -> Result<Vec<usize>, Ass
     Ok((0..used.len()).filter(|&k| used[k]).collect())
 }
 
-fn place_blocks(
+pub(crate) fn place_blocks(
     level: &Level,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     used: &[usize],
 ) -> Result<Vec<SceneBlock>, AssembleError> {
     let neighbours = level.neighbours();
@@ -238,7 +282,7 @@ fn place_blocks(
 /// meet.
 fn crossing(
     level: &Level,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     here: Opening,
     there: Opening,
 ) -> Result<Beyond, AssembleError> {
@@ -334,12 +378,12 @@ fn place_texels(scene: &mut Scene, level: &Level) {
     }
 }
 
-fn scene_shape(dictionary: &Dictionary, index: usize) -> SceneShape {
+fn scene_shape(dictionary: &Dictionary<impl OperatorMatrix>, index: usize) -> SceneShape {
     let entry = &dictionary.shapes[index];
     SceneShape {
-        coefficients_from_direct: entry.coefficients_from_direct.clone(),
-        joint_basis: entry.joint_basis.clone(),
-        probe_basis: entry.probe_basis.clone(),
-        vector_basis: entry.vector_basis.clone(),
+        coefficients_from_direct: entry.coefficients_from_direct.decode().into_owned(),
+        joint_basis: entry.joint_basis.decode().into_owned(),
+        probe_basis: entry.probe_basis.decode().into_owned(),
+        vector_basis: entry.vector_basis.decode().into_owned(),
     }
 }

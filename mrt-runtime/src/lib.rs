@@ -48,6 +48,7 @@ pub mod dictionary;
 pub mod dictionary_file;
 pub mod scene;
 pub mod assemble;
+pub mod pack;
 mod propagate;
 pub mod light;
 pub mod visibility;

@@ -10,8 +10,10 @@
 mod lightfield;
 mod table;
 
+pub(crate) use table::used_paths;
+
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, OperatorMatrix};
 use crate::path::{Roll, hole_of};
 use crate::scene::{Gate, Scene, Transport};
 use crate::shape::Aperture;
@@ -40,26 +42,42 @@ struct ArrivalKey {
 /// Assembles the operator from all blocks' coefficients b to all blocks' joint coefficients.
 pub(crate) fn joint_from_coefficients(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     used_shapes: &[usize],
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
     let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
+    let covered = match config.coupling {
+        Coupling::Table => dictionary.paths.depths(),
+        Coupling::Lightfield => [0; 3],
+    };
     let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);
     // Numbers of holes that a path of the scene may have, for the table's depths.
     let holes = if openings().any(has_hole) { 3 } else { 1 };
+    let goes_on = covered[..holes].iter().any(|&d| d < config.max_depth);
+    // A dictionary that was packed without lightfields ends where its table does.
+    let has_fields = !dictionary.lightfields.parity.is_empty();
+    let fields = (goes_on && has_fields).then(|| dictionary.lightfields.decode());
     for source in 0..scene.blocks.len() {
-        let (mut arrivals, covered) = match config.coupling {
-            Coupling::Table => (table.follow(source), dictionary.paths.depths()),
-            Coupling::Lightfield => (Arrivals::new(), [0; 3]),
+        let mut arrivals = match config.coupling {
+            Coupling::Table => table.follow(source)?,
+            Coupling::Lightfield => Arrivals::new(),
         };
-        if covered[..holes].iter().any(|&d| d < config.max_depth) {
+        if let Some(fields) = &fields {
             let depth = config.max_depth;
-            let rest = lightfield::follow(scene, dictionary, used_shapes, source, depth, covered);
+            let rest = lightfield::follow(
+                scene,
+                dictionary,
+                fields,
+                used_shapes,
+                source,
+                depth,
+                covered,
+            );
             for (key, responses) in rest {
                 add(&mut arrivals, key, responses);
             }
@@ -108,7 +126,7 @@ fn add(arrivals: &mut Arrivals, key: ArrivalKey, responses: Matrix<f32>) {
 /// Projects responses on the joint bases, and sums those of one block behind the same doors.
 fn project(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
     used_shapes: &[usize],
     arrivals: Arrivals,
 ) -> Vec<(Vec<u32>, usize, Matrix<f32>)> {
@@ -129,6 +147,7 @@ fn project(
             // Assembly refuses rolled interfaces that the dictionary has no operators for.
             continue;
         };
+        let operator = operator.decode();
         match sums.last_mut() {
             Some((doors, block, sum)) if *block == key.block && *doors == key.doors => {
                 multiply_add(operator.view(), responses.view(), sum.data_mut());

@@ -1,6 +1,6 @@
 //! `mrt bake`: computes a dictionary.
 
-use crate::commands::info::CouplingReport;
+use crate::commands::info::{CouplingReport, StorageArg};
 use crate::dictionary_source::{DEFAULT_PRESET, bake_with_progress};
 use crate::table::Table;
 use mrt_core::container::{ContainerError, write_file_atomically};
@@ -58,6 +58,9 @@ pub struct BakeArgs {
     /// Weight of the enrichment that keeps coloured walls and many bounces right; 0 leaves it out.
     #[arg(long)]
     pub enrichment: Option<f64>,
+    /// How to store numbers.
+    #[arg(long, value_enum, default_value = "f32")]
+    pub storage: StorageArg,
     /// Print the report as one JSON object.
     #[arg(long)]
     pub json: bool,
@@ -129,7 +132,7 @@ pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
     check_folder(&args.out)?;
     let start = Instant::now();
     let dictionary = bake_with_progress(&config)?;
-    let bytes = dictionary.to_bytes()?;
+    let bytes = dictionary.stored_as(args.storage.into()).to_bytes()?;
     write_file_atomically(&args.out, &bytes)?;
     let report = report(
         args,

@@ -1,11 +1,15 @@
 //! `mrt info`: what a dictionary file holds.
 
-use crate::dictionary_source::{SourceError, from_file};
+use crate::dictionary_source::{SourceError, read_dictionary_file};
 use crate::table::Table;
+use mrt_core::container::ByteBudget;
+use mrt_core::storage::Storage;
 use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_dictionary::spectrum::{Spectrum, closed_cube_spectra};
-use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::dictionary::{Dictionary, OperatorKind, StoredDictionary};
+use mrt_runtime::dictionary_file::DEFAULT_BYTE_BUDGET;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Shows a dictionary's shapes, ranks and sizes.
@@ -20,6 +24,51 @@ pub struct InfoArgs {
     /// Print one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+/// How numbers are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum StorageArg {
+    /// Four bytes a number, exact.
+    F32,
+    /// Two bytes: within 0.03 % of f32.
+    F16,
+    /// One byte for most: within 0.5 % of f32.
+    Int8,
+}
+
+impl From<StorageArg> for Storage {
+    fn from(arg: StorageArg) -> Storage {
+        match arg {
+            StorageArg::F32 => Storage::F32,
+            StorageArg::F16 => Storage::F16,
+            StorageArg::Int8 => Storage::Int8,
+        }
+    }
+}
+
+/// How a kind of operator is stored, and in how many bytes; kinds without elements are left out.
+pub(super) fn kind_bytes(dictionary: &StoredDictionary) -> BTreeMap<OperatorKind, KindBytes> {
+    let mut kinds: BTreeMap<OperatorKind, KindBytes> = BTreeMap::new();
+    dictionary.map(|kind, matrix| {
+        if matrix.rows() * matrix.columns() == 0 {
+            return;
+        }
+        let storage = matrix.storage().name();
+        let entry = kinds.entry(kind).or_insert(KindBytes { bytes: 0, storage });
+        entry.bytes += matrix.bytes();
+        if entry.storage != storage {
+            entry.storage = "mixed";
+        }
+    });
+    kinds
+}
+
+/// See [`kind_bytes`].
+pub(super) struct KindBytes {
+    pub(super) bytes: usize,
+    /// "mixed" if not all are alike.
+    pub(super) storage: &'static str,
 }
 
 /// Why there is nothing to show.
@@ -46,6 +95,8 @@ struct Info<'a> {
     #[serde(flatten)]
     coupling: CouplingReport,
     shapes: Vec<ShapeInfo>,
+    variants: usize,
+    operators: Vec<KindInfo>,
     #[serde(skip_serializing_if = "Option::is_none")]
     spectra: Option<Vec<SpectrumInfo>>,
 }
@@ -63,7 +114,7 @@ pub(super) struct CouplingReport {
 }
 
 impl CouplingReport {
-    pub(super) fn of(dictionary: &Dictionary) -> Self {
+    pub(super) fn of<M>(dictionary: &Dictionary<M>) -> Self {
         let (fields, paths) = (&dictionary.lightfields, &dictionary.paths);
         Self {
             lightfield_modes: fields.parity.len(),
@@ -105,6 +156,13 @@ struct ShapeInfo {
 }
 
 #[derive(Serialize)]
+struct KindInfo {
+    kind: &'static str,
+    storage: &'static str,
+    bytes: usize,
+}
+
+#[derive(Serialize)]
 struct SpectrumInfo {
     matrix: &'static str,
     size: [usize; 2],
@@ -118,7 +176,12 @@ struct SpectrumInfo {
 /// # Errors
 /// [`InfoError`].
 pub fn run(args: &InfoArgs) -> Result<(), InfoError> {
-    let dictionary = from_file(&args.file)?;
+    let bytes = read_dictionary_file(&args.file)?;
+    let mut budget = ByteBudget::new(DEFAULT_BYTE_BUDGET);
+    let dictionary = StoredDictionary::read(&bytes, &mut budget).map_err(|source| {
+        let place = args.file.display().to_string();
+        SourceError::Dictionary { place, source }
+    })?;
     let spectra = if args.spectrum {
         let spectra = closed_cube_spectra(dictionary.resolution, &Progress::silent())?;
         Some(spectra.iter().map(spectrum_info).collect())
@@ -147,7 +210,7 @@ fn spectrum_info(spectrum: &Spectrum) -> SpectrumInfo {
 
 fn info<'a>(
     args: &InfoArgs,
-    dictionary: &'a Dictionary,
+    dictionary: &'a StoredDictionary,
     spectra: Option<Vec<SpectrumInfo>>,
 ) -> Info<'a> {
     Info {
@@ -175,6 +238,15 @@ fn info<'a>(
                 largest_singular_value: entry.singular_values.first().copied().unwrap_or(0.0),
                 smallest_singular_value: entry.singular_values.last().copied().unwrap_or(0.0),
                 bytes: entry.bytes(),
+            })
+            .collect(),
+        variants: dictionary.variants.len(),
+        operators: kind_bytes(dictionary)
+            .into_iter()
+            .map(|(kind, entry)| KindInfo {
+                kind: kind.name(),
+                storage: entry.storage,
+                bytes: entry.bytes,
             })
             .collect(),
         spectra,
@@ -211,6 +283,18 @@ fn print(info: &Info) {
     }
     crate::report!("{table}");
     info.coupling.print();
+    let mut table = Table::new(&["operators", "storage", "bytes"]);
+    for kind in &info.operators {
+        table.row([
+            kind.kind.to_owned(),
+            kind.storage.to_owned(),
+            kind.bytes.to_string(),
+        ]);
+    }
+    crate::report!("{table}");
+    if info.variants > 0 {
+        crate::report_line!("{} variants of shapes", info.variants);
+    }
     crate::report_line!("{} bytes of matrices", info.bytes);
     if let Some(spectra) = &info.spectra {
         crate::report_line!("\nsingular values that hold a share of the energy, closed cube:");

@@ -4,7 +4,7 @@
 //! open rooms have binomially many.
 
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, LightfieldOperators};
+use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix};
 use crate::path::{Roll, frame_of_heading, hole_of};
 use crate::scene::{Beyond, Scene};
 use mrt_core::cube::{CubeRotation, Face};
@@ -40,16 +40,16 @@ struct WaveKey {
 type Front = BTreeMap<WaveKey, Wave>;
 
 /// The sum of all light of a block that enters others, but for paths of up to `covered` openings, which is by the
-/// number of holes on the way (two standing for more).
+/// number of holes on the way (two standing for more); `fields` are the dictionary's, decoded.
 pub(super) fn follow(
     scene: &Scene,
-    dictionary: &Dictionary,
+    dictionary: &Dictionary<impl OperatorMatrix>,
+    fields: &LightfieldOperators,
     used_shapes: &[usize],
     source: usize,
     max_depth: usize,
     covered: [usize; 3],
 ) -> Arrivals {
-    let fields = &dictionary.lightfields;
     let block = &scene.blocks[source];
     let emission = &dictionary.shapes[used_shapes[block.shape_index]].openings;
     let mut front = Front::new();
@@ -64,7 +64,7 @@ pub(super) fn follow(
             doors: &[],
             lightfield: multiply(
                 fields.from_emission.view(),
-                operators.emission_from_coefficients[0].view(),
+                operators.emission_from_coefficients[0].decode().view(),
             ),
         };
         cross(&mut front, scene, fields, sent);

@@ -5,9 +5,10 @@
 //! of one small matrix.
 
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, PathEntry};
-use crate::path::{Crossing, Roll, Word, frame_of_heading, hole_of, response_frame};
-use crate::scene::{Beyond, Scene};
+use crate::assemble::AssembleError;
+use crate::dictionary::{Dictionary, OperatorMatrix, PathTable};
+use crate::path::{Crossing, MAX_WORD, Roll, Word, frame_of_heading, hole_of, response_frame};
+use crate::scene::{Beyond, Scene, SceneBlock};
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply};
@@ -15,9 +16,9 @@ use std::collections::HashMap;
 use std::rc::Rc;
 
 /// The operators of the paths that a scene has, brought to its sources.
-pub(super) struct Table<'a> {
+pub(super) struct Table<'a, M> {
     scene: &'a Scene,
-    dictionary: &'a Dictionary,
+    dictionary: &'a Dictionary<M>,
     used_shapes: &'a [usize],
     max_depth: usize,
     /// Responses from coefficients by (shape, opening, word, frame's roll).
@@ -28,6 +29,8 @@ pub(super) struct Table<'a> {
 struct Path {
     word: Word,
     block: usize,
+    /// The canonical face entered.
+    entered: Face,
     /// Takes the entered block's canonical directions to the source's.
     source_from_here: CubeRotation,
     /// Headings of the word's x and y in the source's frame, as far as they are used.
@@ -36,59 +39,61 @@ struct Path {
     doors: Vec<u32>,
 }
 
-impl<'a> Table<'a> {
-    pub(super) fn new(
-        scene: &'a Scene,
-        dictionary: &'a Dictionary,
-        used_shapes: &'a [usize],
-        max_depth: usize,
-    ) -> Self {
-        Self {
-            scene,
-            dictionary,
-            used_shapes,
-            max_depth,
-            cache: HashMap::new(),
-        }
+/// All paths from a block whose words are in a table.
+struct Walk<'a, M> {
+    blocks: &'a [SceneBlock],
+    paths: &'a PathTable<M>,
+    max_depth: usize,
+    source: usize,
+    /// Position in the source shape's openings of the first one crossed.
+    opening: usize,
+}
+
+impl<M> Clone for Walk<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Walk<'_, M> {}
+
+impl<M> Walk<'_, M> {
+    /// Gives `visit` each path with its word's position in the table.
+    fn follow(self, visit: &mut impl FnMut(usize, &Path)) -> Result<(), AssembleError> {
+        let start = Path {
+            word: Word::default(),
+            block: self.source,
+            entered: self.first(),
+            source_from_here: CubeRotation::IDENTITY,
+            x: None,
+            y: None,
+            doors: Vec::new(),
+        };
+        self.cross(self.first(), &start, visit)
     }
 
-    /// All light of a block that enters others.
-    pub(super) fn follow(&mut self, source: usize) -> Arrivals {
-        let mut arrivals = Arrivals::new();
-        let block = &self.scene.blocks[source];
-        for (opening, aperture) in block.shape.openings.iter().enumerate() {
-            let start = Path {
-                word: Word::default(),
-                block: source,
-                source_from_here: CubeRotation::IDENTITY,
-                x: None,
-                y: None,
-                doors: Vec::new(),
-            };
-            self.cross(source, opening, aperture.face, &start, &mut arrivals);
-        }
-        arrivals
+    /// The face of the source that paths leave by.
+    fn first(self) -> Face {
+        self.blocks[self.source].shape.openings[self.opening].face
     }
 
     /// Goes on through a face of the block that a path has reached.
     fn cross(
-        &mut self,
-        source: usize,
-        opening: usize,
+        self,
         exit: Face,
         path: &Path,
-        arrivals: &mut Arrivals,
-    ) {
-        let here = &self.scene.blocks[path.block];
+        visit: &mut impl FnMut(usize, &Path),
+    ) -> Result<(), AssembleError> {
+        let here = &self.blocks[path.block];
         let Beyond::Block {
             block,
             face: entered,
             here_from_there,
         } = here.beyond[exit.index()]
         else {
-            return;
+            return Ok(());
         };
-        let first = self.scene.blocks[source].shape.openings[opening].face;
+        let first = self.first();
         let heading = path.source_from_here.face(exit);
         let (mut x, mut y) = (path.x, path.y);
         let letter = if heading == first {
@@ -105,47 +110,108 @@ impl<'a> Table<'a> {
             heading: letter,
             hole,
         });
-        let Some(index) = self.entry(&word) else {
-            return;
+        let entries = &self.paths.entries;
+        let Ok(index) = entries.binary_search_by(|entry| entry.word.cmp(&word)) else {
+            return if self.paths.whole_table_has(&word) {
+                Err(AssembleError::MissingPath {
+                    block: self.source,
+                    face: self.blocks[self.source].orientation.face(first),
+                    word: word.name(),
+                })
+            } else {
+                Ok(())
+            };
         };
         let next = Path {
             word,
             block,
+            entered,
             source_from_here: compose(path.source_from_here, here_from_there),
             x,
             y,
             doors: with_door(&path.doors, here.doors[exit.index()]),
         };
-        let frame = path_frame(first, x, y);
-        let responses = self.responses(source, opening, index, frame);
-        let target_frame = CubeSymmetry::from(next.source_from_here.inverse())
-            .after(frame)
-            .after(response_frame(&next.word));
-        arrive(
-            arrivals,
-            &next.doors,
-            (block, entered),
-            target_frame,
-            &self.dictionary.paths.response_parity,
-            &responses,
-        );
+        visit(index, &next);
         if next.word.crossings().len() >= self.max_depth {
-            return;
+            return Ok(());
         }
-        for aperture in self.scene.blocks[block].shape.openings {
+        for aperture in self.blocks[block].shape.openings {
             let heading = next.source_from_here.face(aperture.face);
             let used = [Some(first), next.x, next.y];
             if !used.contains(&Some(heading.opposite())) {
-                self.cross(source, opening, aperture.face, &next, arrivals);
+                self.cross(aperture.face, &next, visit)?;
             }
+        }
+        Ok(())
+    }
+}
+
+/// Which entries of a table the paths of a level have, whatever its depth.
+pub(crate) fn used_paths<M>(
+    blocks: &[SceneBlock],
+    paths: &PathTable<M>,
+) -> Result<Vec<bool>, AssembleError> {
+    let mut used = vec![false; paths.entries.len()];
+    for (source, block) in blocks.iter().enumerate() {
+        for opening in 0..block.shape.openings.len() {
+            let walk = Walk {
+                blocks,
+                paths,
+                max_depth: MAX_WORD,
+                source,
+                opening,
+            };
+            walk.follow(&mut |index, _| used[index] = true)?;
+        }
+    }
+    Ok(used)
+}
+
+impl<'a, M: OperatorMatrix> Table<'a, M> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        dictionary: &'a Dictionary<M>,
+        used_shapes: &'a [usize],
+        max_depth: usize,
+    ) -> Self {
+        Self {
+            scene,
+            dictionary,
+            used_shapes,
+            max_depth,
+            cache: HashMap::new(),
         }
     }
 
-    fn entry(&self, word: &Word) -> Option<usize> {
-        let entries = &self.dictionary.paths.entries;
-        entries
-            .binary_search_by(|entry: &PathEntry| entry.word.cmp(word))
-            .ok()
+    /// All light of a block that enters others.
+    pub(super) fn follow(&mut self, source: usize) -> Result<Arrivals, AssembleError> {
+        let mut arrivals = Arrivals::new();
+        let openings = self.scene.blocks[source].shape.openings;
+        for (opening, aperture) in openings.iter().enumerate() {
+            let walk = Walk {
+                blocks: &self.scene.blocks,
+                paths: &self.dictionary.paths,
+                max_depth: self.max_depth,
+                source,
+                opening,
+            };
+            walk.follow(&mut |index, path| {
+                let frame = path_frame(aperture.face, path.x, path.y);
+                let responses = self.responses(source, opening, index, frame);
+                let target_frame = CubeSymmetry::from(path.source_from_here.inverse())
+                    .after(frame)
+                    .after(response_frame(&path.word));
+                arrive(
+                    &mut arrivals,
+                    &path.doors,
+                    (path.block, path.entered),
+                    target_frame,
+                    &self.dictionary.paths.response_parity,
+                    &responses,
+                );
+            })?;
+        }
+        Ok(arrivals)
     }
 
     /// The path's operator times the emission of the source's shape in the path's frame.
@@ -169,12 +235,14 @@ impl<'a> Table<'a> {
                 let emission = operators
                     .emission_from_coefficients
                     .get(exchanged)
-                    .unwrap_or(&operators.emission_from_coefficients[0]);
+                    .unwrap_or(&operators.emission_from_coefficients[0])
+                    .decode();
                 let parity = &dictionary.paths.emission_parity;
                 let mirrored = Matrix::from_fn(emission.rows(), emission.columns(), |i, j| {
                     roll.sign(parity[i]) * emission[(i, j)]
                 });
                 let operator = &dictionary.paths.entries[word].response_from_emission;
+                let operator = operator.decode();
                 Rc::new(multiply(operator.view(), mirrored.view()))
             })
             .clone()

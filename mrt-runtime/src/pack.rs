@@ -1,0 +1,99 @@
+//! Leaves out of a dictionary what a level does not use, so that a game ships no more.
+
+use crate::assemble::{AssembleError, Coupling, place_blocks, usable_coupling, used_shapes};
+use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix};
+use crate::level::Level;
+use crate::propagate::used_paths;
+
+/// What of a dictionary is kept beside the operators that the level uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PackConfig {
+    /// Bases of probes.
+    pub probes: bool,
+    /// Bases of vector irradiance.
+    pub vector: bool,
+    /// What tools need and frames do not: `L_imp`, and with probes [`Dictionary::sources`].
+    pub sources: bool,
+    /// Lightfields, for [`Coupling::Lightfield`].
+    pub lightfields: bool,
+}
+
+impl Default for PackConfig {
+    /// All that frames can use.
+    fn default() -> Self {
+        Self {
+            probes: true,
+            vector: true,
+            sources: false,
+            lightfields: true,
+        }
+    }
+}
+
+/// The part of a dictionary that a level uses: its shapes, their variants, and the paths that light takes in it.
+///
+/// Scenes are the same to the last bit, whatever the depth to which light is followed. Matrices are cloned, which
+/// copies those that are not borrowed.
+///
+/// # Errors
+/// As [`assemble`](crate::assemble::assemble) with default settings, but for [`AssembleError::TooLarge`].
+pub fn pack<M: OperatorMatrix>(
+    level: &Level,
+    dictionary: &Dictionary<M>,
+    config: &PackConfig,
+) -> Result<Dictionary<M>, AssembleError> {
+    level.check()?;
+    let used = used_shapes(level, dictionary)?;
+    let blocks = place_blocks(level, dictionary, &used)?;
+    let needs_lightfields =
+        usable_coupling(level, dictionary, Coupling::Table)? == Coupling::Lightfield;
+    let used_paths = used_paths(&blocks, &dictionary.paths)?;
+    // Everything but the matrices is small, so leaving out is simpler than choosing.
+    let mut packed = dictionary.clone();
+    packed.shapes = used
+        .iter()
+        .map(|&index| dictionary.shapes[index].clone())
+        .collect();
+    let kept = |name: &str| packed.shapes.iter().any(|entry| entry.shape.name == name);
+    packed
+        .variants
+        .retain(|variant| kept(variant.operators.shape.name));
+    let mut used_paths = used_paths.into_iter();
+    packed
+        .paths
+        .entries
+        .retain(|_| used_paths.next() == Some(true));
+    let variants = packed.variants.iter_mut().map(|v| &mut v.operators);
+    for entry in packed.shapes.iter_mut().chain(variants) {
+        let joint_modes = entry.joint_modes();
+        if !config.probes {
+            entry.probe_basis = M::empty(0, joint_modes);
+        }
+        if !config.vector {
+            entry.vector_basis = M::empty(0, joint_modes);
+        }
+        if !config.sources {
+            entry.implicit_lighting = M::empty(0, entry.modes());
+        }
+    }
+    if !config.probes {
+        packed.probes = 0;
+    }
+    // A response basis has rows for probes, so there is none for a dictionary that lost them.
+    if !config.sources || packed.probes != dictionary.probes {
+        packed.sources = None;
+    }
+    if !config.lightfields && !needs_lightfields {
+        packed.lightfields = LightfieldOperators {
+            parity: Vec::new(),
+            from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
+            straight: M::empty(0, 0),
+            left: M::empty(0, 0),
+            exchange: M::empty(0, 0),
+            holes: Vec::new(),
+            response_from_lightfield: M::empty(dictionary.response_modes(), 0),
+            dropped_energy: dictionary.lightfields.dropped_energy,
+        };
+    }
+    Ok(packed)
+}
