@@ -135,8 +135,9 @@ fn fewer_bytes_are_fewer() {
             .len() as f64
     };
     let whole = bytes(Storage::F32);
-    assert!(bytes(Storage::F16) < 0.65 * whole);
-    assert!(bytes(Storage::Int8) < bytes(Storage::F16));
+    // The small kinds that `f16` leaves at `f32` are a quarter of this preset.
+    assert!(bytes(Storage::F16) < 0.7 * whole);
+    assert!(bytes(Storage::Int8) < 0.4 * whole);
 }
 
 /// Room for a file at a multiple of 64 bytes, as mapped files are, and one byte beyond.
