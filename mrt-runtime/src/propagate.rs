@@ -25,6 +25,9 @@ use std::collections::BTreeMap;
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
 
+/// A matrix at (row part, column part) of a block-sparse one.
+type Placed = (usize, usize, Matrix<f32>);
+
 /// Where and how light enters a block.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct ArrivalKey {
@@ -50,7 +53,7 @@ pub(crate) fn joint_from_coefficients(
         Coupling::Table => None,
         Coupling::Lightfield => Some(dictionary.lightfields.decode()),
     };
-    let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
+    let mut gated: BTreeMap<Vec<u32>, Vec<Placed>> = BTreeMap::new();
     let mut bytes = 0;
     for source in 0..scene.blocks.len() {
         let arrivals = match &fields {
