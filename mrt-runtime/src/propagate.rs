@@ -27,6 +27,9 @@ use std::collections::btree_map::Entry;
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
 
+/// A matrix at (row part, column part) of a block-sparse one.
+type Placed = (usize, usize, Matrix<f32>);
+
 /// Where and how light enters a block.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct ArrivalKey {
@@ -52,7 +55,7 @@ pub(crate) fn joint_from_coefficients(
         Coupling::Table => dictionary.paths.depths(),
         Coupling::Lightfield => [0; 3],
     };
-    let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
+    let mut gated: BTreeMap<Vec<u32>, Vec<Placed>> = BTreeMap::new();
     let mut bytes = 0;
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);

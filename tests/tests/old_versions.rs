@@ -17,6 +17,9 @@ const BYTE_BUDGET: u64 = 16 << 20;
 /// The old program and this one add up in another order; these are a few roundings of `f32`.
 const OLD_FIGURES_TOLERANCE: f64 = 2e-6;
 
+/// What scaling a channel takes of a bounce, at most.
+const MOST_LIMITED: f64 = 3e-3;
+
 fn file(version: u32) -> Vec<u8> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/versions");
     std::fs::read(format!("{folder}/{version}.mrt")).expect("a file of each version is committed")
@@ -94,11 +97,27 @@ fn version_1_lights_a_level_as_its_program_did() {
         let found: Vec<[f32; 3]> = (0..scene.blocks.len())
             .map(|block| frame.indirect_at(&scene, block, 37))
             .collect();
-        let error = largest_difference(&found, expected);
-        assert!(
-            error < OLD_FIGURES_TOLERANCE,
-            "{bounces} bounces: {error:e}"
-        );
+        // Frames have since learnt to scale a channel in which truncation makes light out of nothing, as it does in
+        // a closed level.
+        let mut scaled = *expected;
+        for channel in 0..3 {
+            let sum = |texels: &[[f32; 3]]| -> f64 {
+                texels.iter().map(|texel| f64::from(texel[channel])).sum()
+            };
+            let limited = sum(&found) / sum(expected);
+            let allowed = 1.0 - MOST_LIMITED * f64::from(bounces)..1.0 + OLD_FIGURES_TOLERANCE;
+            assert!(allowed.contains(&limited), "channel {channel}: {limited}");
+            for texel in &mut scaled {
+                texel[channel] = (f64::from(texel[channel]) * limited) as f32;
+            }
+        }
+        let error = largest_difference(&found, &scaled);
+        // Of several bounces each was scaled, by its own share.
+        let tolerance = match bounces {
+            1 => OLD_FIGURES_TOLERANCE,
+            _ => MOST_LIMITED,
+        };
+        assert!(error < tolerance, "{bounces} bounces: {error:e}");
     }
 }
 

@@ -135,8 +135,9 @@ fn fewer_bytes_are_fewer() {
             .len() as f64
     };
     let whole = bytes(Storage::F32);
-    assert!(bytes(Storage::F16) < 0.65 * whole);
-    assert!(bytes(Storage::Int8) < bytes(Storage::F16));
+    // The small kinds that `f16` leaves at `f32` are a quarter of this preset.
+    assert!(bytes(Storage::F16) < 0.7 * whole);
+    assert!(bytes(Storage::Int8) < 0.4 * whole);
 }
 
 /// Room for a file at a multiple of 64 bytes, as mapped files are, and one byte beyond.
@@ -226,13 +227,19 @@ fn packed_dictionaries_give_the_same_light_in_fewer_bytes() {
                 assert!(file.len() < before, "{name}: {} of {before}", file.len());
                 let mut budget = ByteBudget::new(BYTE_BUDGET);
                 let read = StoredDictionary::read(&file, &mut budget).expect("sound");
-                assert!(read == packed, "{name} {config:?}");
+                assert!(
+                    read.to_bytes().expect("it fits") == file,
+                    "{name} {config:?}"
+                );
                 let found = lit(&level, &read, Coupling::Table);
                 let expected = lit(&level, &whole, Coupling::Table);
                 assert!(found == expected, "{name} {config:?} {}", storage.name());
                 // Packing again changes nothing.
                 let again = pack(&level, &read, &config).expect("it fits");
-                assert!(again == packed, "{name} {config:?}");
+                assert!(
+                    again.to_bytes().expect("it fits") == file,
+                    "{name} {config:?}"
+                );
             }
         }
     }

@@ -151,23 +151,30 @@ impl OperatorKind {
     }
 
     /// How matrices of this kind are stored in a dictionary that is to be stored as `storage`: as it says, but for
-    /// two small kinds that are `f16` in dictionaries of `int8`.
+    /// small kinds that are worth more bytes.
     ///
-    /// Chosen by the error of light: relative L2 of indirect irradiance over a level, worst of four light sets on
-    /// four levels (maze, corridor, cube, room; one and four bounces), with the preset `standard`:
+    /// Chosen by the error of light: relative L2 of indirect irradiance over a level, the worst of four light sets on
+    /// four levels (maze, corridor, cube, room) with one and with four bounces:
     ///
-    /// | stored as `int8`, the rest as `f32` | error | bytes saved |
-    /// | --- | --- | --- |
-    /// | bases | 0.45 % | 15 % |
-    /// | `T_d->b` | 0.13 % | 11 % |
-    /// | responses | 0.17 % | 2 % |
-    /// | emission | 0.12 % | 2 % |
-    /// | paths | 0.09 % | 10 % |
+    /// | stored so, the rest `f32` | `f16`: mobile, standard | `int8`: mobile, standard | share of bytes |
+    /// | --- | --- | --- | --- |
+    /// | bases | 0.026 %, 0.024 % | 0.39 %, 0.45 % | 20 % |
+    /// | `T_d->b` | 0.012 %, 0.003 % | 0.20 %, 0.13 % | 14 % |
+    /// | responses | 0.021 %, 0.014 % | 0.17 %, 0.17 % | 3 % |
+    /// | emission | 0.013 %, 0.003 % | 0.05 %, 0.12 % | 3 % |
+    /// | paths | 0.004 %, 0.006 % | 0.09 %, 0.09 % | 14 % |
+    /// | all | 0.034 %, 0.029 % | 0.50 %, 0.49 % | |
     ///
-    /// Errors add up as squares, so all of them make 0.52 %; without the two that save least it is 0.47 %.
+    /// Light is to be within 0.03 % with `f16` and within 0.5 % with `int8`. Responses and emission cost the least for
+    /// what they err, so they are stored one step more exactly. So are lightfields beside `f16`, since they are multiplied once an
+    /// opening: with them at `f16` the preset mobile errs by 0.03 %.
     pub const fn storage(self, storage: Storage) -> Storage {
         match (self, storage) {
-            (OperatorKind::Emission | OperatorKind::JointFromResponse, Storage::Int8) => {
+            (
+                OperatorKind::JointFromResponse | OperatorKind::Emission | OperatorKind::Lightfield,
+                Storage::F16,
+            ) => Storage::F32,
+            (OperatorKind::JointFromResponse | OperatorKind::Emission, Storage::Int8) => {
                 Storage::F16
             }
             _ => storage,

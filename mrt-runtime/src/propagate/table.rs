@@ -21,9 +21,12 @@ pub(super) struct Table<'a, M> {
     dictionary: &'a Dictionary<M>,
     used_shapes: &'a [usize],
     max_depth: usize,
-    /// Responses from coefficients by (shape, opening, word, frame's roll).
-    cache: HashMap<(usize, usize, usize, bool, u8), Rc<Matrix<f32>>>,
+    /// Responses from coefficients.
+    cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
 }
+
+/// Shape, opening, word, and the frame's roll.
+type CacheKey = (usize, usize, usize, bool, u8);
 
 /// A path up to the block that it has just entered.
 struct Path {
