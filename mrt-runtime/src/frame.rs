@@ -414,7 +414,7 @@ fn indirect_from_joint(scene: &Scene, joint: &[f32], indirect: &mut [f32]) {
     }
 }
 
-/// Share by which more may arrive of what direct light left the walls: irradiance is that at texel centres, whose
+/// Share by which more may arrive of direct light that left the walls, and of what they emit: irradiance is that at texel centres, whose
 /// mean differs from a wall's where light comes from nearby. At 3² texels that is 0.1 % for even light, and without
 /// it exact operators would be scaled, and lights not add up.
 const SPOT_GAIN: f64 = 0.05;
@@ -422,18 +422,22 @@ const SPOT_GAIN: f64 = 0.05;
 /// Scales a channel down where more flux would arrive on all walls than left them.
 ///
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
-/// indirect light falls by the largest albedo at each bounce, whatever the level. That of direct light has some
-/// [`SPOT_GAIN`]. Texels of canonical blocks have equal areas.
+/// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
+/// have some [`SPOT_GAIN`]. Texels of canonical blocks have equal areas.
 fn limit_flux(scene: &Scene, direct: &[f32], radiosity: &[f32], indirect: &mut [f32]) {
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0f64, 0.0f64);
         for block in &scene.blocks {
             let start = 3 * block.texels.start + channel * block.texels.len();
             let range = start..start + block.texels.len();
-            let albedo = &scene.texel_albedo[block.texels.clone()];
-            let spots = albedo.iter().zip(&direct[range.clone()]);
-            let of_direct: f64 = spots.map(|(a, &e)| f64::from(a[channel] * e)).sum();
-            sent += sum(&radiosity[range.clone()]) + SPOT_GAIN * of_direct;
+            let texels = block.texels.clone().zip(&direct[range.clone()]);
+            let fresh: f64 = texels
+                .map(|(texel, &e)| {
+                    let reflected = scene.texel_albedo[texel][channel] * e;
+                    f64::from(reflected + scene.texel_emission[texel][channel])
+                })
+                .sum();
+            sent += sum(&radiosity[range.clone()]) + SPOT_GAIN * fresh;
             arrived += sum(&indirect[range]);
         }
         if arrived > sent {

