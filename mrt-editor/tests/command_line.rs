@@ -98,8 +98,15 @@ fn wrong_usage_ends_with_code_2() {
         &["map", "--scene", "a.obj"],
         &["light", "--scene", "a.obj", "--level", "b.toml"],
         &["bake", "--out", "a.mrt", "--modes", "many"],
-        &["bake", "--out", "a.mrt", "--set", "cylinders"],
         &["accuracy", "a.json", "--bounces", "second"],
+        &[
+            "accuracy",
+            "a.json",
+            "--set",
+            "cubes-3d",
+            "--dictionary",
+            "d.mrt",
+        ],
         &[
             "accuracy",
             "a.json",
@@ -205,6 +212,7 @@ fn bake_refuses_settings_out_of_range_and_leaves_nothing() {
         (["--lights-per-axis", "0"], "lights per axis"),
         (["--enrichment", "nan"], "weight"),
         (["--preset", "ultra"], "ultra"),
+        (["--set", "pyramids"], "pyramids"),
     ] {
         let mut all = vec!["bake", "--out", "a.mrt"];
         all.extend(arguments);
@@ -312,12 +320,15 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
     };
     let folder = folder();
     let file = |name: &str| oracle.join(name).into_os_string();
+    // The built-in set has no way up.
+    let flat = ["--set".into(), "cubes-2d".into(), "--json".into()];
     for (name, subject) in [
         ("stack3.json", "stack3"),
         ("cube_probes.json", "cube_probes"),
         ("no-such-file.json", "no-such-file.json"),
     ] {
-        let output = mrt(&folder, &["accuracy".into(), file(name), "--json".into()]);
+        let arguments = [&["accuracy".into(), file(name)], &flat[..]].concat();
+        let output = mrt(&folder, &arguments);
         let error = text(&output.stderr);
         assert_eq!(output.status.code(), Some(1), "{error}");
         assert!(
@@ -326,9 +337,10 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
         );
         assert!(output.stdout.is_empty());
     }
-    let stack = mrt(&folder, &["accuracy".into(), file("stack3.json")]);
+    let arguments = [&["accuracy".into(), file("stack3.json")], &flat[..]].concat();
+    let stack = mrt(&folder, &arguments);
     assert!(
-        text(&stack.stderr).contains("open only sideways"),
+        text(&stack.stderr).contains("cubes-3d"),
         "{}",
         text(&stack.stderr)
     );
@@ -339,13 +351,8 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
         text(&probes.stderr)
     );
     // The sound one is compared all the same.
-    let both = [
-        "accuracy".into(),
-        file("stack3.json"),
-        file("cube.json"),
-        "--json".into(),
-    ];
-    let output = mrt(&folder, &both);
+    let both = ["accuracy".into(), file("stack3.json"), file("cube.json")];
+    let output = mrt(&folder, &[&both, &flat[..]].concat());
     assert_eq!(output.status.code(), Some(1));
     assert!(text(&output.stdout).lines().count() > 0);
     let albedo = [
@@ -355,6 +362,38 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
         "1.5".into(),
     ];
     assert_refused(&mrt(&folder, &albedo), "1.5");
+    let set = [
+        "accuracy".into(),
+        file("cube.json"),
+        "--set".into(),
+        "pyramids".into(),
+    ];
+    assert_refused(&mrt(&folder, &set), "pyramids");
+}
+
+#[test]
+fn accuracy_takes_the_set_that_a_stack_needs() {
+    let Some(oracle) = oracle_folder_or_report("`mrt accuracy` on a stack") else {
+        return;
+    };
+    let folder = folder();
+    let arguments = [
+        "accuracy".into(),
+        oracle.join("stack3.json").into_os_string(),
+        "--preset".into(),
+        "mobile".into(),
+        "--json".into(),
+    ];
+    let output = mrt(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let stdout = text(&output.stdout);
+    assert_eq!(stdout.lines().count(), 3, "{stdout}");
+    for line in stdout.lines() {
+        let line: Value = serde_json::from_str(line).expect("a JSON object a line");
+        let error = line["rel_l2"].as_f64().expect("a number");
+        // The mobile preset's bound in white levels is 8 % in the mean.
+        assert!(error < 0.15, "{line}");
+    }
 }
 
 #[test]

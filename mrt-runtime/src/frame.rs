@@ -323,7 +323,13 @@ impl Frame {
         indirect_from_joint(scene, &self.joint, &mut self.indirect);
         // Truncated bases leave small negative values; they end here, once, on the final sum.
         self.indirect.iter_mut().for_each(|e| *e = e.max(0.0));
-        limit_flux(scene, &self.radiosity, &mut self.indirect, &mut self.joint);
+        limit_flux(
+            scene,
+            &self.direct,
+            &self.radiosity,
+            &mut self.indirect,
+            &mut self.joint,
+        );
         let end = Instant::now();
         self.times.coefficients += after_coefficients - start;
         self.times.responses += after_responses - after_coefficients;
@@ -496,17 +502,36 @@ fn vector_from_joint(scene: &Scene, joint: &[f32], vector: &mut [f32]) {
     }
 }
 
+/// Share by which more may arrive of direct light that left the walls, and of what they emit: irradiance is that at
+/// texel centres, whose mean differs from a wall's where light comes from nearby. At 3² texels that is 0.1 % for even
+/// light, and without it exact operators would be scaled, and lights not add up.
+const SPOT_GAIN: f64 = 0.05;
+
 /// Scales a channel down where more flux would arrive on all walls than left them.
 ///
-/// Exact transport never does that. Where truncated operators did, bounces would grow without end; so total flux
-/// falls by the largest albedo at each bounce, whatever the level. Texels of canonical blocks have equal areas.
-fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32], joint: &mut [f32]) {
+/// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
+/// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
+/// have some [`SPOT_GAIN`]. Texels of canonical blocks have equal areas.
+fn limit_flux(
+    scene: &Scene,
+    direct: &[f32],
+    radiosity: &[f32],
+    indirect: &mut [f32],
+    joint: &mut [f32],
+) {
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0f64, 0.0f64);
         for block in &scene.blocks {
             let start = 3 * block.texels.start + channel * block.texels.len();
             let range = start..start + block.texels.len();
-            sent += sum(&radiosity[range.clone()]);
+            let texels = block.texels.clone().zip(&direct[range.clone()]);
+            let fresh: f64 = texels
+                .map(|(texel, &e)| {
+                    let reflected = scene.texel_albedo[texel][channel] * e;
+                    f64::from(reflected + scene.texel_emission[texel][channel])
+                })
+                .sum();
+            sent += sum(&radiosity[range.clone()]) + SPOT_GAIN * fresh;
             arrived += sum(&indirect[range]);
         }
         if arrived > sent {

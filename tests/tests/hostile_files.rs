@@ -65,6 +65,8 @@ fn small() -> Dictionary {
             dropped_energy: 0.2,
         },
         paths: PathTable {
+            depth: 1,
+            hole_depth: 0,
             emission_parity: vec![0, 1],
             response_parity: vec![0, 3],
             entries: ["z", "zx"]
