@@ -417,15 +417,16 @@ fn indirect_from_joint(scene: &Scene, joint: &[f32], indirect: &mut [f32]) {
 /// Scales a channel down where more flux would arrive on all walls than left them.
 ///
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so total flux
-/// falls by the largest albedo at each bounce, whatever the level. Texels of canonical blocks have equal areas.
+/// falls by the largest albedo at each bounce, whatever the level. Areas are those of the canonical blocks.
 fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0f64, 0.0f64);
         for block in &scene.blocks {
             let start = 3 * block.texels.start + channel * block.texels.len();
             let range = start..start + block.texels.len();
-            sent += sum(&radiosity[range.clone()]);
-            arrived += sum(&indirect[range]);
+            let areas = &scene.shapes[block.shape_index].texel_areas;
+            sent += flux(&radiosity[range.clone()], areas);
+            arrived += flux(&indirect[range], areas);
         }
         if arrived > sent {
             let scale = (sent / arrived) as f32;
@@ -439,8 +440,13 @@ fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
     }
 }
 
-fn sum(values: &[f32]) -> f64 {
-    values.iter().map(|&x| f64::from(x)).sum()
+/// Sum by area; no areas stand for equal ones.
+fn flux(values: &[f32], areas: &[f32]) -> f64 {
+    if areas.is_empty() {
+        return values.iter().map(|&x| f64::from(x)).sum();
+    }
+    let weighted = values.iter().zip(areas);
+    weighted.map(|(&x, &a)| f64::from(x) * f64::from(a)).sum()
 }
 
 /// Largest difference over the largest value.

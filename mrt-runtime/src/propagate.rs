@@ -43,11 +43,17 @@ pub(crate) fn joint_from_coefficients(
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
+    // Tubes have no table: each operator of a lightfield is the size of a path's.
+    let coupling = if dictionary.paths.entries.is_empty() {
+        Coupling::Lightfield
+    } else {
+        config.coupling
+    };
     let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
     let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
     for source in 0..scene.blocks.len() {
-        let arrivals = match config.coupling {
+        let arrivals = match coupling {
             Coupling::Table => table.follow(source),
             Coupling::Lightfield => {
                 lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)

@@ -15,7 +15,7 @@ use mrt_dictionary::symmetry::texel_parity_classes;
 use mrt_dictionary::transport::{block_transport, fold_bounce};
 use mrt_runtime::frame::{Bounces, Frame};
 use mrt_runtime::level::Level;
-use mrt_runtime::shape::SHAPES;
+use mrt_runtime::shape::cubes;
 use mrt_runtime::visibility::Openings;
 
 /// Largest and mean deviation from 1.
@@ -169,7 +169,7 @@ fn all_modes_together_are_the_dense_operator() {
     let closed = closed_cube_bounce(RESOLUTION, Reconstruction::Constant, &Progress::silent())
         .expect("nobody cancels");
     let mut random = Random(1);
-    for shape in &SHAPES {
+    for shape in cubes() {
         let bounce = restrict_to_shape(&closed, shape, RESOLUTION);
         let classes = texel_parity_classes(shape, RESOLUTION);
         // A prior that leaves nothing out.
