@@ -343,6 +343,17 @@ impl BakeConfig {
             ),
         };
         let (prior, field, coupling) = (&self.prior, &self.lightfield, &self.coupling);
+        let paths = if self.has_tubes() {
+            String::new()
+        } else {
+            format!(
+                " with paths of up to {} openings ({} with a hole), k_e <= {}, k_r <= {}",
+                coupling.depth,
+                coupling.hole_depth,
+                coupling.emission_modes,
+                coupling.response_modes
+            )
+        };
         let k_d = match prior.k_d {
             usize::MAX => "all".to_owned(),
             k_d => k_d.to_string(),
@@ -350,9 +361,8 @@ impl BakeConfig {
         format!(
             "{0}² texels a wall, k_b <= {1}; prior of {2}³ lights of radius {3} inside and beyond each \
              opening, k_d {k_d}, {enrichment}; lightfields of {4}² positions x {5}² directions with {6}² \
-             super-samples, k_rlf <= {7}, {8} enrichment rounds of weight {9}; {10} with paths of up to {11} \
-             openings ({12} with a hole), k_e <= {13}, k_r <= {14}, up to {15} modes for foreign light, weight \
-             {16} beyond openings; {17}³ probes{18}",
+             super-samples, k_rlf <= {7}, {8} enrichment rounds of weight {9}; {10}{paths}, up to {11} modes for foreign light, weight {12} \
+             beyond openings; {13}³ probes{14}",
             self.resolution,
             self.modes,
             prior.lights_per_axis,
@@ -364,10 +374,6 @@ impl BakeConfig {
             field.enrichment_rounds,
             field.enrichment_weight,
             self.shapes,
-            coupling.depth,
-            coupling.hole_depth,
-            coupling.emission_modes,
-            coupling.response_modes,
             coupling.foreign_modes,
             coupling.beyond_weight,
             self.outputs.probes,

@@ -274,3 +274,242 @@ fn a_tunnel_of_the_standard_preset_agrees_with_a_path_tracer() {
     let worst = worst_error(&dictionary, &TUNNEL, 64);
     assert!(worst < 0.06, "{worst}");
 }
+
+/// Light of a level and of its image under a map of space, texel by texel: relative L2.
+fn image_error(level: &Level, image: &Level, map: impl Fn(DVec3) -> DVec3) -> f64 {
+    let light = DVec3::new(2.4, 0.6, 1.45);
+    let (here, there) = (
+        assembled(level, small_dictionary()),
+        assembled(image, small_dictionary()),
+    );
+    let found = lit(&here, &[lamp(light)], Bounces::Count(2));
+    let mapped = lit(&there, &[lamp(map(light))], Bounces::Count(2));
+    let (mut miss, mut norm) = (0.0, 0.0);
+    for (block, other) in here.blocks.iter().zip(&there.blocks) {
+        for texel in block.texels.clone() {
+            let place = map(here.texel_positions[texel].as_dvec3());
+            let distance = |k: &usize| there.texel_positions[*k].as_dvec3().distance(place);
+            let twin = other
+                .texels
+                .clone()
+                .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+                .expect("a tube has texels");
+            // Positions are single precision.
+            assert!(distance(&twin) < 1e-5);
+            miss += (found[texel] - mapped[twin]).powi(2);
+            norm += found[texel].powi(2);
+        }
+    }
+    (miss / norm).sqrt()
+}
+
+#[test]
+fn a_mirrored_tunnel_has_mirrored_light() {
+    let mirrored = TUNNEL.map(|[x, y, z]| [x, y, -z]);
+    let mirror = |p: DVec3| DVec3::new(p.x, p.y, 1.0 - p.z);
+    let error = image_error(&tunnel(&TUNNEL), &tunnel(&mirrored), mirror);
+    println!("mirrored: {error:.1e}");
+    // The operators hold the mirrors of the shapes up to the rounding of f32, some 1e-6 a product.
+    assert!(error < 1e-4, "{error}");
+}
+
+#[test]
+fn bends_up_and_down_are_bends_to_the_side() {
+    // A quarter turn about x: z becomes y.
+    let turned = TUNNEL.map(|[x, y, z]| [x, z, -y]);
+    let turn = |p: DVec3| DVec3::new(p.x, p.z, 1.0 - p.y);
+    let error = image_error(&tunnel(&TUNNEL), &tunnel(&turned), turn);
+    println!("turned: {error:.1e}");
+    // A straight tube may be rolled between bends that are not: what the basis loses in that exchange.
+    assert!(error < 0.01, "{error}");
+}
+
+#[test]
+fn a_white_furnace_stays_white_in_a_long_tunnel() {
+    let cells: [[i32; 3]; 9] = std::array::from_fn(|x| [x as i32, 0, 0]);
+    let scene = assembled(&tunnel(&cells), small_dictionary());
+    let mut frame = Frame::new(&scene);
+    let direct = vec![1.0; 3 * scene.texel_count()];
+    frame
+        .solve_from_direct(&scene, &direct, Bounces::Count(1))
+        .expect("one value a texel");
+    let found = indirect(&scene, &frame);
+    for texel in scene.blocks[4].texels.clone() {
+        // Of the light at the middle, 0.1 % comes in through the ends, 4 widths and more away; the rest is
+        // the bases' error at their borders.
+        assert!(
+            (found[texel] / f64::from(ALBEDO) - 1.0).abs() < 0.03,
+            "{}",
+            found[texel]
+        );
+    }
+}
+
+#[test]
+fn energy_never_grows() {
+    let mut level = tunnel(&TUNNEL);
+    for block in &mut level.blocks {
+        block.albedo = [Vec3::ONE; 6];
+    }
+    let scene = assembled(&level, small_dictionary());
+    let areas = areas(&scene);
+    let mut frame = Frame::new(&scene);
+    let flux = |e: &[f64]| e.iter().zip(&areas).map(|(e, a)| e * a).sum::<f64>();
+    let lights = [lamp(middle(TUNNEL[4]))];
+    let mut before = 0.0;
+    let mut added = f64::INFINITY;
+    for passes in 1..40 {
+        frame
+            .solve(&scene, &lights, &Openings, Bounces::Count(passes))
+            .expect("a legal light");
+        let now = flux(&indirect(&scene, &frame));
+        // Each bounce brings less than the one before; f32 rounds sums of 10⁴ texels.
+        assert!(now - before <= added * (1.0 + 1e-4), "{passes}");
+        (added, before) = (now - before, now);
+    }
+}
+
+#[test]
+fn joined_tubes_have_no_seam() {
+    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
+    let mut frame = Frame::new(&scene);
+    let lights = [lamp(middle(TUNNEL[4]) + DVec3::new(0.1, 0.05, 0.1))];
+    frame
+        .solve(&scene, &lights, &Openings, Bounces::Count(2))
+        .expect("a legal light");
+    let found = indirect(&scene, &frame);
+    let mean = found.iter().sum::<f64>() / found.len() as f64;
+    let resolution = scene.resolution;
+    // The two texels nearest to an opening in each row, nearest first, with their places.
+    let rows = |block: usize, side: Face| -> Vec<(DVec3, [usize; 2])> {
+        let placed = &scene.blocks[block];
+        let point = |k: usize| scene.texel_positions[placed.texels.start + k].as_dvec3();
+        let plane = placed.warp.point(side.point(0.5, 0.5));
+        let out = (plane - placed.warp.center()).normalize();
+        let depth = |k: usize| (plane - point(k)).dot(out);
+        (0..placed.texels.len() / resolution)
+            .map(|row| {
+                let (first, last) = (row * resolution, (row + 1) * resolution - 1);
+                let pair = if depth(first) < depth(last) {
+                    [first, first + 1]
+                } else {
+                    [last, last - 1]
+                };
+                (point(pair[0]), pair.map(|k| placed.texels.start + k))
+            })
+            .collect()
+    };
+    let (mut squares, mut count) = (0.0, 0);
+    for connection in &tunnel(&TUNNEL).connections {
+        let canonical = |end: &Opening| {
+            let placed = &scene.blocks[end.block];
+            rows(end.block, placed.orientation.inverse().face(end.face))
+        };
+        let (ours, theirs) = (canonical(&connection.a), canonical(&connection.b));
+        for (place, [a, further_a]) in &ours {
+            let (_, [b, further_b]) = theirs
+                .iter()
+                .min_by(|p, q| p.0.distance(*place).total_cmp(&q.0.distance(*place)))
+                .expect("rows");
+            let jump =
+                1.5 * (found[*a] - found[*b]) - 0.5 * (found[*further_a] - found[*further_b]);
+            squares += jump * jump;
+            count += 1;
+        }
+    }
+    let seam = (squares / f64::from(count)).sqrt() / mean;
+    println!("seams: {seam:.4} of the mean");
+    assert!(seam < 0.03, "{seam}");
+}
+
+#[test]
+fn borders_of_the_lightmap_go_on_around_and_along_the_tunnel() {
+    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
+    let mut frame = Frame::new(&scene);
+    frame
+        .solve(
+            &scene,
+            &[lamp(middle(TUNNEL[2]))],
+            &Openings,
+            Bounces::Count(1),
+        )
+        .expect("a legal light");
+    // All places on the rims of charts, with what the lightmap says there.
+    let mut rims: Vec<(DVec3, [f32; 3], [usize; 2])> = Vec::new();
+    for (index, block) in scene.blocks.iter().enumerate() {
+        for face in block.shape.walls() {
+            for k in 0..scene.resolution {
+                let along = (k as f64 + 0.5) / scene.resolution as f64;
+                for (u, v) in [(0.0, along), (1.0, along), (along, 0.0), (along, 1.0)] {
+                    let place = block
+                        .warp
+                        .point(block.shape.wall_point(face, u, v).position);
+                    let pixel = scene.atlas.pixel(index, face, u as f32, v as f32);
+                    let light = scene
+                        .atlas
+                        .sample(frame.lightmap(), pixel.expect("a chart"));
+                    rims.push((place, light, [index, face.index()]));
+                }
+            }
+        }
+    }
+    let mut pairs = 0;
+    for (a, (place, light, tile)) in rims.iter().enumerate() {
+        for (other, there, other_tile) in &rims[a + 1..] {
+            if tile != other_tile && place.distance(*other) < 1e-9 {
+                // Means of the same two texels.
+                assert!((light[0] - there[0]).abs() <= 1e-6 * light[0].abs().max(1e-3));
+                pairs += 1;
+            }
+        }
+    }
+    // Four rims along each of ten tubes, and nine discs of four charts.
+    assert_eq!(pairs, (10 * 4 + 9 * 4) * scene.resolution);
+}
+
+#[test]
+fn an_unconnected_tube_reads_zero() {
+    let mut level = tunnel(&TUNNEL[..4]);
+    level.connections.pop();
+    let scene = assembled(&level, small_dictionary());
+    let found = lit(&scene, &[lamp(middle(TUNNEL[0]))], Bounces::Count(4));
+    let texels = &scene.blocks[3].texels;
+    assert!(found[texels.clone()].iter().all(|&e| e == 0.0));
+    assert!(
+        found[scene.blocks[2].texels.clone()]
+            .iter()
+            .any(|&e| e > 0.0)
+    );
+}
+
+#[test]
+fn a_light_outside_the_round_wall_is_refused() {
+    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
+    let mut frame = Frame::new(&scene);
+    let corner = lamp(DVec3::new(1.5, 0.05, 0.05));
+    let refused = frame.solve(&scene, &[corner], &Openings, Bounces::Count(1));
+    let expected = LightError::OutsideTube {
+        light: 0,
+        block: 1,
+        found: Vec3::new(1.5, 0.05, 0.05),
+    };
+    assert_eq!(refused, Err(expected.into()));
+}
+
+#[test]
+fn the_bake_of_tubes_does_not_depend_on_threads() {
+    let mut config = BakeConfig::preset_for("mobile", "cylinders").expect("a preset");
+    config.resolution = 6;
+    config.lightfield.positions = 6;
+    config.lightfield.directions = 10;
+    config.lightfield.lightfield_modes = 24;
+    let bytes = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let baked = pool
+            .build()
+            .expect("threads")
+            .install(|| bake(&config, &Progress::silent()));
+        baked.expect("nobody cancels").to_bytes().expect("finite")
+    };
+    assert_eq!(bytes(1), bytes(3));
+}
