@@ -59,7 +59,16 @@ pub fn symmetric_eigen(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
     if size == 0 {
         return (Vec::new(), Matrix::zeros(0, 0));
     }
-    let eigen = DMatrix::from_column_slice(size, size, a.data()).symmetric_eigen();
+    let matrix = DMatrix::from_column_slice(size, size, a.data());
+    let mut eigen = matrix.clone().symmetric_eigen();
+    if eigen.eigenvalues.iter().any(|value| !value.is_finite()) {
+        // nalgebra divides 0 by 0 in some singular matrices, such as products of columns that come twice. Shifted by
+        // their trace they are far from singular, and the eigenvalues lose no more than rounding of the largest.
+        let shift = matrix.trace();
+        let shifted = matrix + DMatrix::from_diagonal_element(size, size, shift);
+        eigen = shifted.symmetric_eigen();
+        eigen.eigenvalues.add_scalar_mut(-shift);
+    }
     let mut order: Vec<usize> = (0..size).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
     let vectors = Matrix::from_fn(size, size, |i, j| eigen.eigenvectors[(i, order[j])]);
@@ -160,6 +169,26 @@ mod tests {
     fn assert_close(a: &Matrix<f64>, b: &Matrix<f64>, tolerance: f64) {
         for (x, y) in a.data().iter().zip(b.data()) {
             assert!((x - y).abs() <= tolerance, "{x} against {y}");
+        }
+    }
+
+    #[test]
+    fn eigenvalues_of_columns_that_come_twice_are_those_of_the_columns_doubled() {
+        for size in [1, 5, 40] {
+            let once = sample(60, size);
+            let columns: Vec<&[f64]> = (0..2 * size).map(|j| once.column(j % size)).collect();
+            let twice = Matrix::from_columns(60, &columns);
+            let gram = |m: &Matrix<f64>| transpose_multiply(m.view(), m.view());
+            let (expected, _) = symmetric_eigen(gram(&once).view());
+            let (found, _) = symmetric_eigen(gram(&twice).view());
+            for (k, value) in found.iter().enumerate() {
+                let expected = expected.get(k).map_or(0.0, |v| 2.0 * v);
+                // Rounding of the largest, times the dimension.
+                assert!(
+                    (value - expected).abs() <= 1e-13 * found[0],
+                    "{size} {k}: {value}"
+                );
+            }
         }
     }
 

@@ -115,9 +115,7 @@ fn basis(
         progress.check()?;
         // What leaves by the other opening is the mirror image, whose parts of each parity are the same.
         let opening = tube.form.openings()[0];
-        let emitted = emitted(grid, tube, opening, config);
-        sent.push(exchanged(grid, &emitted));
-        sent.push(emitted);
+        sent.push(emitted(grid, tube, opening, config));
     }
     let modes = config.lightfield.lightfield_modes;
     let mut basis = lightfield_basis(&classes, &sent, modes, progress)?;

@@ -140,6 +140,9 @@ struct Place {
     point: DVec3,
 }
 
+/// How far beyond an opening, in u, a tube's border looks for the neighbour's first texel.
+const PAST: f64 = 1e-6;
+
 /// The texel, as (block, index in it), that column and row of a wall show, both in -1..=resolution: one
 /// step outside is the neighbour's wall across an opening, or the nearest texel inside at a crease.
 ///
@@ -156,7 +159,8 @@ fn texel_seen(
 ) -> Option<(usize, usize)> {
     let center = |k: isize| (k as f64 + 0.5) / resolution as f64;
     if let Some(form) = blocks[block].shape.tube() {
-        let (u, v) = (center(column), center(row));
+        // Just past an opening, not half a texel: the neighbour's texels may be far shorter.
+        let (u, v) = (center(column).clamp(-PAST, 1.0 + PAST), center(row));
         return texel_seen_in_tube(blocks, block, form.surface(face, u, v).position, resolution);
     }
     let here = Place {

@@ -143,3 +143,29 @@ fn leaves_through(portal: &Portal, origin: DVec3, direction: DVec3) -> bool {
         (corner - origin).cross(next - origin).dot(direction) >= 0.0
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Shape;
+    use mrt_core::hexahedron::Hexahedron;
+
+    #[test]
+    fn lines_pass_a_disc_where_they_pass_its_plane() {
+        let shape = Shape::from_name("tube").expect("a tube");
+        let warp = Hexahedron::cell(DVec3::ZERO);
+        for opening in shape.openings {
+            let portal = Portal::new(&warp, opening);
+            let outward = opening.face.outward();
+            let origin = DVec3::new(0.5, 0.4, 0.45);
+            for (offset, passes) in [(0.0, true), (0.39, true), (0.41, false)] {
+                for side in [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+                    let at = opening.face.point(0.5, 0.5) + side * offset;
+                    assert_eq!(leaves_through(&portal, origin, at - origin), passes);
+                    assert!(portal.crossing(origin, at - origin).distance(at) < 1e-12);
+                }
+            }
+            assert!(!leaves_through(&portal, origin, -outward));
+        }
+    }
+}

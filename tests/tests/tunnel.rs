@@ -155,8 +155,11 @@ fn areas(scene: &Scene) -> Vec<f64> {
     areas
 }
 
-/// Facets along each axis of a chart: at 64 a chord is 3e-5 off its arc, half of the tracer's own offset.
+/// Facets along each axis of a chart: at 64 facets lie up to 1e-4 inside the wall.
 const FACETS: usize = 64;
+
+/// How far receivers are lifted off the wall, so that they are not behind its facets.
+const LIFT: f64 = 2e-4;
 
 fn mesh(scene: &Scene) -> TriangleMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
@@ -198,7 +201,7 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
         .texel_positions
         .iter()
         .zip(&scene.texel_normals)
-        .map(|(p, n)| (p.as_dvec3(), n.as_dvec3()))
+        .map(|(p, n)| (p.as_dvec3() + n.as_dvec3() * LIFT, n.as_dvec3()))
         .collect();
     [1, 2].map(|seed| {
         let settings = PathSettings {
@@ -271,7 +274,8 @@ fn a_tunnel_agrees_with_a_path_tracer() {
 fn a_tunnel_of_the_standard_preset_agrees_with_a_path_tracer() {
     let config = BakeConfig::preset_for("standard", "cylinders").expect("a preset");
     let dictionary = bake(&config, &Progress::silent()).expect("nobody cancels");
-    let worst = worst_error(&dictionary, &TUNNEL, 64);
+    assert!(seam(&dictionary) < 0.03);
+    let worst = worst_error(&dictionary, &TUNNEL, 32);
     assert!(worst < 0.06, "{worst}");
 }
 
@@ -363,15 +367,23 @@ fn energy_never_grows() {
             .solve(&scene, &lights, &Openings, Bounces::Count(passes))
             .expect("a legal light");
         let now = flux(&indirect(&scene, &frame));
-        // Each bounce brings less than the one before; f32 rounds sums of 10⁴ texels.
-        assert!(now - before <= added * (1.0 + 1e-4), "{passes}");
+        // Each bounce brings less than the one before, up to what f32 leaves of the sum.
+        assert!(now - before <= added + 1e-5 * now, "{passes}");
         (added, before) = (now - before, now);
     }
 }
 
 #[test]
 fn joined_tubes_have_no_seam() {
-    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
+    // Straight lines through the last two of 12 texels overshoot at the bends: 3 % at the standard preset.
+    let seam = seam(small_dictionary());
+    assert!(seam < 0.06, "{seam}");
+}
+
+/// Jump of the light between joined tubes, extrapolated to their opening from both sides: root mean square over the
+/// rims, over the mean of the level.
+fn seam(dictionary: &Dictionary) -> f64 {
+    let scene = assembled(&tunnel(&TUNNEL), dictionary);
     let mut frame = Frame::new(&scene);
     let lights = [lamp(middle(TUNNEL[4]) + DVec3::new(0.1, 0.05, 0.1))];
     frame
@@ -419,7 +431,7 @@ fn joined_tubes_have_no_seam() {
     }
     let seam = (squares / f64::from(count)).sqrt() / mean;
     println!("seams: {seam:.4} of the mean");
-    assert!(seam < 0.03, "{seam}");
+    seam
 }
 
 #[test]
@@ -453,12 +465,17 @@ fn borders_of_the_lightmap_go_on_around_and_along_the_tunnel() {
             }
         }
     }
+    let brightest = rims.iter().fold(0f32, |most, rim| most.max(rim.1[0]));
     let mut pairs = 0;
     for (a, (place, light, tile)) in rims.iter().enumerate() {
         for (other, there, other_tile) in &rims[a + 1..] {
             if tile != other_tile && place.distance(*other) < 1e-9 {
-                // Means of the same two texels.
-                assert!((light[0] - there[0]).abs() <= 1e-6 * light[0].abs().max(1e-3));
+                // Means of the same two texels, with weights of 1/2 that f32 knows to 1e-5 in an image of this size.
+                let slack = 1e-5 * brightest;
+                assert!(
+                    (light[0] - there[0]).abs() <= slack,
+                    "{tile:?} {other_tile:?}"
+                );
                 pairs += 1;
             }
         }
