@@ -440,7 +440,7 @@ fn limit_flux(scene: &Scene, radiosity: &[f32], indirect: &mut [f32]) {
     }
 }
 
-/// Sum by area; no areas stand for equal ones.
+/// Sum by area; no areas stand for areas of 1.
 fn flux(values: &[f32], areas: &[f32]) -> f64 {
     if areas.is_empty() {
         return values.iter().map(|&x| f64::from(x)).sum();

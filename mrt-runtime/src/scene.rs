@@ -190,7 +190,7 @@ pub struct SceneShape {
     pub probe_basis: Matrix<f32>,
     /// 4 texels x joint modes: vector irradiance, or no rows.
     pub vector_basis: Matrix<f32>,
-    /// Area of each texel over their mean; empty where all are of one size.
+    /// Area of each texel over that of a cube's; empty for cubes.
     pub texel_areas: Vec<f32>,
 }
 
