@@ -138,8 +138,6 @@ fn of_class(operator: &Matrix<f64>, classes: &ParityClasses, class: usize) -> Ma
 mod tests {
     use super::*;
 
-    /// What a straight tube sends on is what one twice as long gets from its other half: all rows, against the
-    /// closed form that a ring at distance x along the axis has.
     #[test]
     fn light_beyond_falls_off_as_between_rings() {
         let resolution = 12;
@@ -147,9 +145,8 @@ mod tests {
         let operator = beyond_opening(TubeForm::Straight, resolution, 1.0, &weights);
         let uniform = Matrix::from_fn(operator.columns(), 1, |_, _| 1.0);
         let light = mrt_core::matrix::multiply(operator.view(), uniform.view());
-        // Form factor from a point of the wall to the wall beyond distance x on one side: with
-        // s = x / 2R, F(x) = (1 - x' (x'^2 + 3/2) / (x'^2 + 1)^1.5 ...) for a ring; integrate its known
-        // density (1 - s (2 s² + 3) / (2 (s² + 1)^1.5)) / 2R.
+        // Form factor from a point of the wall to all rings up to a distance x on one side, by the known density of
+        // a ring's, with s = x / 2R.
         let cumulated = |x: f64| {
             let steps = 2000;
             let density = |x: f64| {
