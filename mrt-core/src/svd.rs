@@ -220,6 +220,26 @@ mod tests {
     }
 
     #[test]
+    fn eigenvalues_of_columns_that_come_twice_are_those_of_the_columns_doubled() {
+        for size in [1, 5, 40] {
+            let once = sample(60, size);
+            let columns: Vec<&[f64]> = (0..2 * size).map(|j| once.column(j % size)).collect();
+            let twice = Matrix::from_columns(60, &columns);
+            let gram = |m: &Matrix<f64>| transpose_multiply(m.view(), m.view());
+            let (expected, _) = symmetric_eigen(gram(&once).view());
+            let (found, _) = symmetric_eigen(gram(&twice).view());
+            for (k, value) in found.iter().enumerate() {
+                let expected = expected.get(k).map_or(0.0, |v| 2.0 * v);
+                // Rounding of the largest, times the dimension.
+                assert!(
+                    (value - expected).abs() <= 1e-13 * found[0],
+                    "{size} {k}: {value}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn full_rank_equals_the_matrix() {
         for (rows, columns) in [(30, 12), (12, 30), (9, 9), (1, 5)] {
             let a = sample(rows, columns);

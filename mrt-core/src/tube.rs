@@ -207,6 +207,31 @@ impl TubeForm {
         TUBE_RADIUS - (across * across + up * up).sqrt()
     }
 
+    /// The point itself, or the nearest one of the wall if it is outside.
+    pub fn drawn_inside(self, point: DVec3) -> DVec3 {
+        let [across, up] = self.section_of(point);
+        let scale = TUBE_RADIUS / (across * across + up * up).sqrt();
+        // Also false for the centre line, where the scale is infinite.
+        let is_outside = scale < 1.0;
+        if !is_outside {
+            return point;
+        }
+        let height = 0.5 + up * scale;
+        match self {
+            TubeForm::Straight => DVec3::new(point.x, height, 0.5 + across * scale),
+            TubeForm::Bend => {
+                // No point of the axis has a nearest one.
+                let distance = (BEND_RADIUS + across).max(f64::MIN_POSITIVE);
+                let stretch = (BEND_RADIUS + across * scale) / distance;
+                DVec3::new(
+                    1.0 + (point.x - 1.0) * stretch,
+                    height,
+                    1.0 + (point.z - 1.0) * stretch,
+                )
+            }
+        }
+    }
+
     /// True in the tube or on its wall, between the openings, within a tolerance of 1e-6.
     pub fn contains(self, point: DVec3) -> bool {
         let past = match self {

@@ -14,6 +14,7 @@ use crate::path_transport::Gather;
 use crate::progress::{Cancelled, Progress};
 use crate::response::{ResponseBasis, response_basis, rows, stack};
 use crate::shape_transport::{ShapeTransport, neighbours, shape_transport};
+use crate::tube_bake::bake_tubes;
 use mrt_core::matrix::{Matrix, multiply};
 use mrt_runtime::dictionary::{
     Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
@@ -29,6 +30,9 @@ use mrt_runtime::shape::{Hole, Outline, Shape, shape_set};
 /// [`Cancelled`].
 pub fn bake(config: &BakeConfig, progress: &Progress) -> Result<Dictionary, Cancelled> {
     let shapes = shape_set(&config.shapes).unwrap_or_default();
+    if shapes.iter().any(|shape| shape.tube().is_some()) {
+        return bake_tubes(config, &shapes, progress);
+    }
     let set = Set::of(&shapes);
     let steps = 2 * shapes.len() + 6 + config.lightfield.enrichment_rounds;
     let mut done = 0;

@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use crate::bounce::{Reconstruction, closed_cube_bounce, restrict_to_shape};
     use crate::progress::Progress;
-    use mrt_runtime::shape::SHAPES;
+    use mrt_runtime::shape::cubes;
 
     #[test]
     fn rays_agree_with_the_closed_form() {
@@ -85,7 +85,7 @@ mod tests {
         const RAYS: u32 = 4096;
         let closed = closed_cube_bounce(RESOLUTION, Reconstruction::Constant, &Progress::silent())
             .expect("nobody cancels");
-        for shape in &SHAPES {
+        for shape in cubes() {
             let exact = restrict_to_shape(&closed, shape, RESOLUTION);
             let traced = ray_traced_bounce(shape, RESOLUTION, RAYS);
             for (t, e) in traced.data().iter().zip(exact.data()) {

@@ -1,7 +1,7 @@
 //! Settings of a bake and the named presets.
 
 use mrt_runtime::dictionary_file::MAX_MODES;
-use mrt_runtime::shape::{SHAPE_SETS, shape_set};
+use mrt_runtime::shape::{SHAPE_SETS, Shape, shape_set};
 
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -183,6 +183,31 @@ impl BakeConfig {
         })
     }
 
+    /// The preset for a set of shapes: tubes have 32² texels a chart, or 12² of `mobile`, and no probes.
+    ///
+    /// # Errors
+    /// [`ConfigError::UnknownPreset`] and [`ConfigError::UnknownSet`].
+    pub fn preset_for(name: &str, set: &str) -> Result<Self, ConfigError> {
+        let mut config = Self::preset(name)?;
+        config.shapes = set.to_owned();
+        if shape_set(set).is_none() {
+            return Err(ConfigError::UnknownSet {
+                found: set.to_owned(),
+            });
+        }
+        if config.has_tubes() {
+            config.resolution = if name == "mobile" { 12 } else { 32 };
+            config.outputs.probes = 0;
+        }
+        Ok(config)
+    }
+
+    /// True for a set of tubes.
+    pub fn has_tubes(&self) -> bool {
+        let is_tube = |shape: &&Shape| shape.tube().is_some();
+        shape_set(&self.shapes).is_some_and(|shapes| shapes.iter().any(is_tube))
+    }
+
     /// Checks every setting.
     ///
     /// # Errors
@@ -263,7 +288,18 @@ impl BakeConfig {
                 MAX_PATH_DEPTH,
             ),
             ("beyond weight", self.coupling.beyond_weight, 0.0, 1000.0),
-            ("probes along an edge", self.outputs.probes as f64, 0.0, 8.0),
+            (
+                "probes along an edge",
+                self.outputs.probes as f64,
+                0.0,
+                if self.has_tubes() { 0.0 } else { 8.0 },
+            ),
+            (
+                "number of vector irradiances",
+                f64::from(u8::from(self.outputs.vector)),
+                0.0,
+                if self.has_tubes() { 0.0 } else { 1.0 },
+            ),
             (
                 "lightfield samples times modes",
                 (lightfield.positions * lightfield.directions).pow(2) as f64
@@ -307,6 +343,17 @@ impl BakeConfig {
             ),
         };
         let (prior, field, coupling) = (&self.prior, &self.lightfield, &self.coupling);
+        let paths = if self.has_tubes() {
+            String::new()
+        } else {
+            format!(
+                " with paths of up to {} openings ({} with a hole), k_e <= {}, k_r <= {}",
+                coupling.depth,
+                coupling.hole_depth,
+                coupling.emission_modes,
+                coupling.response_modes
+            )
+        };
         let k_d = match prior.k_d {
             usize::MAX => "all".to_owned(),
             k_d => k_d.to_string(),
@@ -314,9 +361,8 @@ impl BakeConfig {
         format!(
             "{0}² texels a wall, k_b <= {1}; prior of {2}³ lights of radius {3} inside and beyond each \
              opening, k_d {k_d}, {enrichment}; lightfields of {4}² positions x {5}² directions with {6}² \
-             super-samples, k_rlf <= {7}, {8} enrichment rounds of weight {9}; {10} with paths of up to {11} \
-             openings ({12} with a hole), k_e <= {13}, k_r <= {14}, up to {15} modes for foreign light, weight \
-             {16} beyond openings; {17}³ probes{18}",
+             super-samples, k_rlf <= {7}, {8} enrichment rounds of weight {9}; {10}{paths}, up to {11} modes for foreign light, weight {12} \
+             beyond openings; {13}³ probes{14}",
             self.resolution,
             self.modes,
             prior.lights_per_axis,
@@ -328,10 +374,6 @@ impl BakeConfig {
             field.enrichment_rounds,
             field.enrichment_weight,
             self.shapes,
-            coupling.depth,
-            coupling.hole_depth,
-            coupling.emission_modes,
-            coupling.response_modes,
             coupling.foreign_modes,
             coupling.beyond_weight,
             self.outputs.probes,

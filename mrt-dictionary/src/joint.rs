@@ -15,6 +15,7 @@ use glam::{DVec3, IVec3};
 use mrt_core::cube::Face;
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
+use mrt_core::parity::ParityClasses;
 use mrt_core::svd::{largest_entry_sign, symmetric_eigen};
 use mrt_runtime::path::frame_of_heading;
 use mrt_runtime::shape::Shape;
@@ -56,46 +57,75 @@ pub fn joint_basis(
     extra: usize,
     has_exchanges: bool,
 ) -> JointBasis {
+    let exchanges: &[bool] = if has_exchanges {
+        &[false, true]
+    } else {
+        &[false]
+    };
+    let arriving = shape
+        .openings
+        .iter()
+        .flat_map(|opening| {
+            exchanges
+                .iter()
+                .map(|&is_exchanged| (opening.face, is_exchanged))
+        })
+        .map(|(face, is_exchanged)| {
+            let (field, vector) =
+                response_at(shape, face, is_exchanged, response, resolution, probes);
+            Arriving { field, vector }
+        })
+        .collect();
+    let classes = output_parity_classes(shape, resolution, probes);
+    joint_of(
+        own,
+        arriving,
+        &classes,
+        &response.scales,
+        extra,
+        exchanges.len(),
+    )
+}
+
+/// Light that enters a shape in one way.
+#[derive(Clone, Debug)]
+pub struct Arriving {
+    /// Outputs of the shape (texels, then samples of probes) x response modes.
+    pub field: Matrix<f64>,
+    /// 4 texels x response modes, or no rows.
+    pub vector: Matrix<f64>,
+}
+
+/// Adds up to `extra` modes to a shape's own for the given responses, whose modes count by their `scales`; `ways` of
+/// them enter at each opening.
+pub fn joint_of(
+    own: &OwnLight,
+    arriving: Vec<Arriving>,
+    classes: &ParityClasses,
+    scales: &[f64],
+    extra: usize,
+    ways: usize,
+) -> JointBasis {
     let samples = ProbeSamples::default();
     let texels = own.irradiance.rows();
     let base = stack(&own.irradiance, &samples.from_sh(&own.probes, PROBE_WEIGHT));
     // The coefficients of U_b's columns whose sum is nearest to a signal.
     let base_gram = transpose_multiply(base.view(), base.view());
     let nearest = multiply(pseudo_inverse(&base_gram).view(), base.transposed().view());
-    let exchanges: &[bool] = if has_exchanges {
-        &[false, true]
-    } else {
-        &[false]
-    };
-    let mut responses = Vec::new();
-    for opening in shape.openings {
-        for &is_exchanged in exchanges {
-            let (field, vector) = response_at(
-                shape,
-                opening.face,
-                is_exchanged,
-                response,
-                resolution,
-                probes,
-            );
+    let responses: Vec<Response> = arriving
+        .into_iter()
+        .map(|Arriving { field, vector }| {
             let of_base = multiply(nearest.view(), field.view());
             let rest = difference(&field, &multiply(base.view(), of_base.view()));
-            responses.push(Response {
+            Response {
                 field,
                 vector,
                 of_base,
                 rest,
-            });
-        }
-    }
-    let found = extra_modes(
-        shape,
-        &responses,
-        &response.scales,
-        resolution,
-        probes,
-        extra,
-    );
+            }
+        })
+        .collect();
+    let found = extra_modes(classes, &responses, scales, extra);
     let (mut irradiance, mut vector) = (own.irradiance.clone(), own.vector.clone());
     let mut probe_samples = rows(&base, texels..base.rows());
     for weights in &found.weights {
@@ -127,10 +157,10 @@ pub fn joint_basis(
         probes: samples.to_sh(&probe_samples, PROBE_WEIGHT),
         vector,
         joint_from_response: operators
-            .chunks(exchanges.len())
+            .chunks(ways)
             .map(<[Matrix<f64>]>::to_vec)
             .collect(),
-        dropped_energy: found.dropped_energy(&responses, &response.scales),
+        dropped_energy: found.dropped_energy(&responses, scales),
     }
 }
 
@@ -238,11 +268,9 @@ impl Extra {
 
 /// The largest singular vectors of what is left of all responses, class by class (method of snapshots).
 fn extra_modes(
-    shape: &Shape,
+    classes: &ParityClasses,
     responses: &[Response],
     scales: &[f64],
-    resolution: usize,
-    probes: usize,
     extra: usize,
 ) -> Extra {
     if responses.is_empty() || extra == 0 {
@@ -251,7 +279,6 @@ fn extra_modes(
             kept_energy: 0.0,
         };
     }
-    let classes = output_parity_classes(shape, resolution, probes);
     let columns: Vec<(usize, usize)> = (0..responses.len())
         .flat_map(|r| (0..scales.len()).map(move |k| (r, k)))
         .collect();

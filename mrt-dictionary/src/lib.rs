@@ -4,6 +4,9 @@
 //! light [`prior`], and the reduced [`transport`]. For all together: [`lightfield`]s at the openings and the
 //! [`interface`] operators between them. [`bake`] is that list of calls.
 //!
+//! For tubes: their own [`tube_bounce`], [`tube_prior`], [`tube_transport`], [`tube_lightfield`] and
+//! [`tube_response`], called by [`tube_bake`].
+//!
 //! For a block that is warped too far for the canonical operators: its own [`warped_symmetry`],
 //! [`warped_bounce`], [`warped_prior`] and [`warped`] transport, and the [`warp_error`] to decide by.
 
@@ -34,3 +37,5 @@ pub mod tube_bounce;
 pub mod tube_prior;
 pub mod tube_lightfield;
 pub mod tube_response;
+pub mod tube_transport;
+pub mod tube_bake;

@@ -14,12 +14,13 @@ use mrt_core::form_factor::{HalfSpace, clip_polygon, cone_through, point_to_poly
 use mrt_core::matrix::Matrix;
 use mrt_core::polygon_moments::polygon_moments;
 use mrt_runtime::path::{Word, response_frame};
-use mrt_runtime::shape::{Aperture, Hole, Outline, Shape};
+use mrt_runtime::shape::{Aperture, Form, Hole, Outline, Shape};
 use rayon::prelude::*;
 
 /// The cube that light leaves through z = 1.
 pub static EMITTER: Shape = Shape {
     name: "emitter",
+    form: Form::Cube,
     openings: &[Aperture {
         face: Face::PosZ,
         outline: Outline::Whole,
@@ -29,6 +30,7 @@ pub static EMITTER: Shape = Shape {
 /// The cube that light enters through z = 0.
 pub static RECEIVER: Shape = Shape {
     name: "receiver",
+    form: Form::Cube,
     openings: &[Aperture {
         face: Face::NegZ,
         outline: Outline::Whole,
@@ -155,7 +157,7 @@ pub fn gather(word: &Word, radiosity: Signals, gather: &Gather) -> Gathered {
 }
 
 /// The outlines of a path's openings in the emitter's coordinates, and the axis along which each is crossed.
-fn windows(word: &Word) -> Vec<(usize, [DVec3; 4])> {
+fn windows(word: &Word) -> Vec<(usize, Vec<DVec3>)> {
     let mut cell = DVec3::ZERO;
     word.crossings()
         .iter()
@@ -168,7 +170,8 @@ fn windows(word: &Word) -> Vec<(usize, [DVec3; 4])> {
                 face: crossing.heading,
                 outline,
             };
-            let corners = aperture.corners().map(|corner| corner + cell);
+            let corners = aperture.corners().into_iter();
+            let corners = corners.map(|corner| corner + cell).collect();
             cell += crossing.heading.outward();
             (crossing.heading.axis(), corners)
         })
@@ -177,17 +180,17 @@ fn windows(word: &Word) -> Vec<(usize, [DVec3; 4])> {
 
 /// Calls `visit` with every texel of the emitter that a point sees through the windows, and what it sees of it.
 fn for_each_visible(
-    windows: &[(usize, [DVec3; 4])],
+    windows: &[(usize, Vec<DVec3>)],
     point: DVec3,
     resolution: usize,
     mut visit: impl FnMut(usize, &[DVec3]),
 ) {
     let mut scratch = Vec::with_capacity(16);
     let mut cone: Vec<HalfSpace> = Vec::with_capacity(16);
-    let Some((&(_, first), others)) = windows.split_first() else {
+    let Some(((_, first), others)) = windows.split_first() else {
         return;
     };
-    let in_front = |axis: usize, corners: &[DVec3; 4]| point[axis] > corners[0][axis] + 1e-9;
+    let in_front = |axis: usize, corners: &[DVec3]| point[axis] > corners[0][axis] + 1e-9;
     if windows
         .iter()
         .any(|(axis, corners)| !in_front(*axis, corners))

@@ -102,12 +102,36 @@ pub fn enriched_prior(
     classes: &ParityClasses,
     config: &Enrichment,
 ) -> LightPrior {
-    let walls = shape.wall_count();
+    let roots = vec![1.0; classes.point_count()];
+    enriched_weighted_prior(
+        prior,
+        indirect_basis,
+        shape.wall_count(),
+        &roots,
+        classes,
+        config,
+    )
+}
+
+/// [`enriched_prior`] for a prior and an indirect basis that are weighted by the texels' `roots` (of area, over the
+/// mean), on so many walls of equally many texels.
+pub fn enriched_weighted_prior(
+    prior: &LightPrior,
+    indirect_basis: &Matrix<f64>,
+    walls: usize,
+    roots: &[f64],
+    classes: &ParityClasses,
+    config: &Enrichment,
+) -> LightPrior {
     let per_wall = classes.point_count() / walls.max(1);
     let constants = Matrix::from_fn(classes.point_count(), walls, |texel, wall| {
-        f64::from(u8::from(texel / per_wall == wall))
+        if texel / per_wall == wall {
+            roots[texel]
+        } else {
+            0.0
+        }
     });
-    let uniform = Matrix::from_fn(classes.point_count(), 1, |_, _| 1.0);
+    let uniform = Matrix::from_fn(classes.point_count(), 1, |texel, _| roots[texel]);
     let parts: Vec<(f64, Vec<Matrix<f64>>)> = vec![
         (1.0, prior.basis.classes.clone()),
         (config.uniform_weight, fold_all(classes, &uniform)),

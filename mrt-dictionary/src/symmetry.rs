@@ -92,12 +92,11 @@ fn scaled(point: DVec3, steps: usize) -> IVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mrt_runtime::shape::SHAPES;
+    use mrt_runtime::shape::cubes;
 
     #[test]
     fn fold_factors_are_those_of_the_shapes() {
-        let factors: Vec<(&str, usize)> = SHAPES
-            .iter()
+        let factors: Vec<(&str, usize)> = cubes()
             .filter(|shape| shape.wall_count() > 0)
             .map(|shape| (shape.name, texel_parity_classes(shape, 4).class_count()))
             .collect();
@@ -121,7 +120,7 @@ mod tests {
 
     #[test]
     fn probes_follow_the_mirrors() {
-        for shape in &SHAPES {
+        for shape in cubes() {
             let texels = shape.texel_count(4);
             let classes = output_parity_classes(shape, 4, 2);
             assert_eq!(classes.point_count(), texels + 8 * DIRECTIONS.len());

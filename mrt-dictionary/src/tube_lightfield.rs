@@ -181,9 +181,12 @@ pub fn tube_enriched_basis(
     progress: &Progress,
 ) -> Result<LightfieldBasis, Cancelled> {
     let scaled = basis.vectors.scaled_columns(&basis.scales);
-    let mut sent = Vec::with_capacity(3);
-    for passage in [Passage::STRAIGHT, Passage::LEFT, Passage::RIGHT] {
-        sent.push(tube_propagated(grid, &scaled, passage));
+    let mut sent = Vec::with_capacity(2);
+    // What goes right is the mirror image of what goes left and in each parity the same up to its sign, so the one
+    // stands for both.
+    for (passage, share) in [(Passage::STRAIGHT, 1.0), (Passage::LEFT, 2f64.sqrt())] {
+        let propagated = tube_propagated(grid, &scaled, passage);
+        sent.push(propagated.scaled_columns(&vec![share; scaled.columns()]));
         progress.check()?;
     }
     let norm = root_sum_of_squares(sent.iter().map(Matrix::frobenius_norm));

@@ -8,11 +8,15 @@ use mrt_runtime::direct::irradiance;
 use mrt_runtime::frame::Frame;
 use mrt_runtime::light::{Light, LightError, PlacedLight, place};
 use mrt_runtime::scene::Scene;
+use mrt_runtime::shape::Shape;
 use mrt_runtime::visibility::{Openings, Receiver};
 use std::f32::consts::PI;
 
 /// Parts along each axis into which a wall is cut: warped walls are bent.
 const WALL_PARTS: usize = 4;
+
+/// The same for a chart of a tube, a quarter of the way around: chords are 2e-4 block widths off their arcs.
+const CHART_PARTS: usize = 24;
 
 /// Distance, in lengths of the ray's direction, by which a ray restarts behind a wall seen from outside.
 const RESTART: f32 = 1e-4;
@@ -66,15 +70,19 @@ impl<'a> LevelView<'a> {
                 if !with_ceilings && block.orientation.face(face) == Face::PosY {
                     continue;
                 }
-                for cell in 0..WALL_PARTS * WALL_PARTS {
-                    let at = |k: usize| k as f32 / WALL_PARTS as f32;
-                    let (i, j) = (cell % WALL_PARTS, cell / WALL_PARTS);
+                let parts = match block.shape.tube() {
+                    None => WALL_PARTS,
+                    Some(_) => CHART_PARTS,
+                };
+                for cell in 0..parts * parts {
+                    let at = |k: usize| k as f32 / parts as f32;
+                    let (i, j) = (cell % parts, cell / parts);
                     let [a, b] = [[at(i), at(j)], [at(i + 1), at(j)]];
                     let [c, d] = [[at(i + 1), at(j + 1)], [at(i), at(j + 1)]];
                     for corners in [[a, b, c], [a, c, d]] {
                         for [u, v] in corners {
-                            let unit = face.point(f64::from(u), f64::from(v));
-                            positions.push(block.warp.point(unit).as_vec3());
+                            let wall = block.shape.wall_point(face, f64::from(u), f64::from(v));
+                            positions.push(block.warp.point(wall.position).as_vec3());
                         }
                         triangles.push(Patch {
                             block: index,
@@ -109,9 +117,10 @@ impl<'a> LevelView<'a> {
             let mix = |k: usize| a[k] + hit.u * (b[k] - a[k]) + hit.v * (c[k] - a[k]);
             let (u, v) = (mix(0), mix(1));
             let block = &self.scene.blocks[patch.block];
-            let normal = block
-                .warp
-                .face_normal(patch.face, f64::from(u), f64::from(v));
+            let wall = block
+                .shape
+                .wall_point(patch.face, f64::from(u), f64::from(v));
+            let normal = wall.warped_normal(&block.warp);
             if normal.dot(direction.as_dvec3()) < 0.0 {
                 return Some(self.leaving(patch, u, v, normal));
             }
@@ -122,10 +131,11 @@ impl<'a> LevelView<'a> {
 
     fn leaving(&self, patch: &Patch, u: f32, v: f32, normal: DVec3) -> (Vec3, Vec3) {
         let block = &self.scene.blocks[patch.block];
-        let unit = patch.face.point(f64::from(u), f64::from(v));
+        let (across, up) = (f64::from(u), f64::from(v));
+        let wall = block.shape.wall_point(patch.face, across, up);
         let receiver = Receiver {
             block: patch.block,
-            position: block.warp.point(unit),
+            position: block.warp.point(wall.position),
         };
         let direct: Vec3 = self
             .lights
@@ -147,7 +157,7 @@ impl<'a> LevelView<'a> {
             .map_or(Vec3::ZERO, |pixel| {
                 Vec3::from_array(atlas.sample(self.frame.lightmap(), pixel))
             });
-        let texel = patch.face.texel_index(unit, self.scene.resolution);
+        let texel = Shape::texel_of_uv(self.scene.resolution, across, up);
         let albedo = block
             .shape
             .wall_offset(patch.face, self.scene.resolution)

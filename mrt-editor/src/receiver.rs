@@ -15,6 +15,7 @@ use glam::{DVec3, Vec3};
 use lookup::Lookup;
 use mrt_core::bvh::Bvh;
 use mrt_core::cube::{CubeRotation, Face};
+use mrt_core::tube::TubeForm;
 use mrt_runtime::level::{Block, Level};
 use trilinear::Trilinear;
 
@@ -82,6 +83,8 @@ struct Placed {
     width: f64,
     /// Of the canonical shape.
     is_wall: [bool; 6],
+    /// Its form, if it is a tube.
+    tube: Option<TubeForm>,
     /// Blocks that it is connected to.
     neighbours: Vec<usize>,
 }
@@ -143,6 +146,9 @@ impl ReceiverMap {
         let (point, normal) = (point.as_dvec3(), normal.as_dvec3());
         let Found { block, unit, .. } = self.block_in_front(point, normal)?;
         let placed = &self.blocks[block];
+        if let Some(receiver) = placed.on_tube(block, unit) {
+            return Some(receiver);
+        }
         let facing = placed.facing(unit, normal);
         let face = self.face_seen(point, unit, &facing).or_else(|| {
             let score = |face: Face| facing[face.index()] - NEARNESS_WEIGHT * depth(face, unit);
@@ -167,6 +173,10 @@ impl ReceiverMap {
         };
         let placed = &self.blocks[own.block];
         let share = placed.share_lit(point, normal, &own);
+        if let Some(receiver) = placed.on_tube(own.block, own.unit) {
+            blend.add(receiver, share);
+            return blend;
+        }
         if let Some(face) = self.face_seen(point, own.unit, &placed.facing(own.unit, normal)) {
             blend.add(on_face(own.block, face, own.unit), share);
             return blend;
@@ -327,7 +337,14 @@ impl Placed {
             width: warp.jacobian(DVec3::splat(0.5)).determinant().abs().cbrt(),
             neighbours: Vec::new(),
             is_wall: Face::ALL.map(|face| !block.shape.is_open(face)),
+            tube: block.shape.tube(),
         }
+    }
+
+    /// The nearest point of a tube's wall, which is smooth: no normal is needed to choose a chart.
+    fn on_tube(&self, block: usize, unit: DVec3) -> Option<Receiver> {
+        let (face, u, v) = self.tube?.chart_of(unit);
+        Some(Receiver { block, face, u, v })
     }
 
     fn walls(&self) -> impl Iterator<Item = Face> + '_ {

@@ -41,6 +41,16 @@ pub enum ReferenceLevelError {
     /// The frame refuses a light.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// Its walls are flat.
+    #[error(
+        "exact solution: block {block} is a `{shape}`; expected only cubes, since the exact solver has flat walls"
+    )]
+    Tube {
+        /// Which block.
+        block: usize,
+        /// Its shape.
+        shape: &'static str,
+    },
     /// Only sphere lights have an exact counterpart.
     #[error("exact solution: light {light} is not a sphere light; expected only sphere lights")]
     Light {
@@ -60,6 +70,11 @@ pub fn measure(
     lights: &[Light],
     bounces: u32,
 ) -> Result<LevelErrors, ReferenceLevelError> {
+    let tube = level.blocks.iter().position(|b| b.shape.tube().is_some());
+    if let Some(block) = tube {
+        let shape = level.blocks[block].shape.name;
+        return Err(ReferenceLevelError::Tube { block, shape });
+    }
     let start = Instant::now();
     let exact = exact_scene(level, scene.resolution)?;
     let transport = Transport::build(&exact);

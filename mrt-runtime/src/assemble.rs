@@ -6,6 +6,7 @@ use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::path::hole_of;
 use crate::propagate;
 use crate::scene::{Beyond, Portal, Scene, SceneBlock, SceneShape, Transport};
+use crate::wall::UnitFromWorld;
 use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
@@ -24,8 +25,8 @@ pub struct AssembleConfig {
 /// How light is taken from block to block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Coupling {
-    /// By the dictionary's operator of each whole path of openings; by lightfields with a dictionary that was baked
-    /// without a table, as those of format version 1 were.
+    /// By the dictionary's operator of each whole path of openings, and by lightfields beyond the longest of them; by
+    /// lightfields alone where the dictionary was baked without paths, as that of tubes.
     #[default]
     Table,
     /// By lightfields passed on from opening to opening, as in the paper.
@@ -262,6 +263,7 @@ pub(crate) fn place_blocks(
             orientation: block.orientation,
             portals: portals.map(|opening| Portal::new(&warp, opening)).collect(),
             bounds: warp.bounds(),
+            unit_from_world: UnitFromWorld::new(&warp),
             warp,
             beyond,
             texels: texel..texel + texels,
@@ -358,8 +360,17 @@ fn crossing(
 fn place_texels(scene: &mut Scene, level: &Level) {
     for (block, placed) in level.blocks.iter().zip(&scene.blocks) {
         for (face, unit) in placed.shape.texels(scene.resolution) {
-            let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
-            let normal = placed.warp.face_normal(face, u, v);
+            let normal = match placed.shape.tube() {
+                None => {
+                    let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
+                    placed.warp.face_normal(face, u, v)
+                }
+                Some(form) => {
+                    let (face, u, v) = form.chart_of(unit);
+                    let point = placed.shape.wall_point(face, u, v);
+                    point.warped_normal(&placed.warp)
+                }
+            };
             scene
                 .texel_positions
                 .push(placed.warp.point(unit).as_vec3());
@@ -385,5 +396,6 @@ fn scene_shape(dictionary: &Dictionary<impl OperatorMatrix>, index: usize) -> Sc
         joint_basis: entry.joint_basis.decode().into_owned(),
         probe_basis: entry.probe_basis.decode().into_owned(),
         vector_basis: entry.vector_basis.decode().into_owned(),
+        texel_areas: entry.shape.relative_texel_areas(dictionary.resolution),
     }
 }

@@ -2,7 +2,8 @@
 //! that copies what a bilinear filter must see there.
 //!
 //! Across an opening the border shows the neighbouring block's wall, so joined blocks have no seam; at
-//! creases inside a block it repeats the wall's own edge.
+//! creases inside a block it repeats the wall's own edge. The charts of a tube meet without a crease, and show
+//! one another.
 
 use crate::scene::{Beyond, SceneBlock};
 use crate::shape::Shape;
@@ -139,6 +140,9 @@ struct Place {
     point: DVec3,
 }
 
+/// How far beyond an opening, in u, a tube's border looks for the neighbour's first texel.
+const PAST: f64 = 1e-6;
+
 /// The texel, as (block, index in it), that column and row of a wall show, both in -1..=resolution: one
 /// step outside is the neighbour's wall across an opening, or the nearest texel inside at a crease.
 ///
@@ -154,6 +158,11 @@ fn texel_seen(
     resolution: usize,
 ) -> Option<(usize, usize)> {
     let center = |k: isize| (k as f64 + 0.5) / resolution as f64;
+    if let Some(form) = blocks[block].shape.tube() {
+        // Just past an opening, not half a texel: the neighbour's texels may be far shorter.
+        let (u, v) = (center(column).clamp(-PAST, 1.0 + PAST), center(row));
+        return texel_seen_in_tube(blocks, block, form.surface(face, u, v).position, resolution);
+    }
     let here = Place {
         block,
         wall: face,
@@ -180,6 +189,41 @@ fn texel_seen(
     let offset = shape.wall_offset(seen.wall, resolution)?;
     let texel = texel_of_wall(shape, seen.wall, seen.point, resolution);
     Some((seen.block, offset + texel))
+}
+
+/// The texel of a tube's wall at a point, or that of the tube beyond an opening that the point is past.
+///
+/// Charts are quarters of the section in every tube, and joined openings are the same disc: rows of texels go on
+/// from tube to tube and around each.
+fn texel_seen_in_tube(
+    blocks: &[SceneBlock],
+    block: usize,
+    point: DVec3,
+    resolution: usize,
+) -> Option<(usize, usize)> {
+    let placed = &blocks[block];
+    let (mut block, mut point) = (block, point);
+    for opening in placed.shape.openings {
+        let side = opening.face;
+        let past = (point - side.point(0.5, 0.5)).dot(side.outward());
+        if let (
+            true,
+            Beyond::Block {
+                block: there,
+                here_from_there,
+                ..
+            },
+        ) = (past > 0.0, placed.beyond[side.index()])
+        {
+            point = here_from_there.inverse().point(point - side.outward());
+            block = there;
+            break;
+        }
+    }
+    let shape = blocks[block].shape;
+    let (chart, u, v) = shape.tube()?.chart_of(point);
+    let texel = Shape::texel_of_uv(resolution, u, v);
+    Some((block, shape.wall_offset(chart, resolution)? + texel))
 }
 
 /// The texel at a point, or the nearest that is wall where there is a hole.

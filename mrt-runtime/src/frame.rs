@@ -511,7 +511,7 @@ const SPOT_GAIN: f64 = 0.05;
 ///
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
 /// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
-/// have some [`SPOT_GAIN`]. Texels of canonical blocks have equal areas.
+/// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
 fn limit_flux(
     scene: &Scene,
     direct: &[f32],
@@ -524,15 +524,17 @@ fn limit_flux(
         for block in &scene.blocks {
             let start = 3 * block.texels.start + channel * block.texels.len();
             let range = start..start + block.texels.len();
+            let areas = &scene.shapes[block.shape_index].texel_areas;
             let texels = block.texels.clone().zip(&direct[range.clone()]);
             let fresh: f64 = texels
-                .map(|(texel, &e)| {
+                .zip(areas)
+                .map(|((texel, &e), &area)| {
                     let reflected = scene.texel_albedo[texel][channel] * e;
-                    f64::from(reflected + scene.texel_emission[texel][channel])
+                    f64::from((reflected + scene.texel_emission[texel][channel]) * area)
                 })
                 .sum();
-            sent += sum(&radiosity[range.clone()]) + SPOT_GAIN * fresh;
-            arrived += sum(&indirect[range]);
+            sent += flux(&radiosity[range.clone()], areas) + SPOT_GAIN * fresh;
+            arrived += flux(&indirect[range], areas);
         }
         if arrived > sent {
             let scale = (sent / arrived) as f32;
@@ -550,8 +552,13 @@ fn limit_flux(
     }
 }
 
-fn sum(values: &[f32]) -> f64 {
-    values.iter().map(|&x| f64::from(x)).sum()
+/// Sum by area; no areas stand for areas of 1.
+fn flux(values: &[f32], areas: &[f32]) -> f64 {
+    if areas.is_empty() {
+        return values.iter().map(|&x| f64::from(x)).sum();
+    }
+    let weighted = values.iter().zip(areas);
+    weighted.map(|(&x, &a)| f64::from(x) * f64::from(a)).sum()
 }
 
 /// Largest difference over the largest value.

@@ -40,6 +40,7 @@
 //! ```
 
 pub mod shape;
+pub mod wall;
 pub mod path;
 pub mod level;
 pub mod level_text;

@@ -84,6 +84,19 @@ pub enum LightError {
         /// The position given.
         found: Vec3,
     },
+    /// In the cube of a tube, outside its wall.
+    #[error(
+        "light {light}: position {found} m lies in the cube of block {block}, outside the round wall of its tube; \
+         expected a point inside the tube"
+    )]
+    OutsideTube {
+        /// Which light.
+        light: usize,
+        /// The tube.
+        block: usize,
+        /// The position given.
+        found: Vec3,
+    },
 }
 
 /// A light whose values have been checked, and the block that it stands in. Made by [`place`].
@@ -136,9 +149,16 @@ pub fn place(scene: &Scene, index: usize, light: Light) -> Result<PlacedLight, L
         scene
             .block_at(point, WALL_TOLERANCE)
             .map(Some)
-            .ok_or(LightError::OutsideBlocks {
-                light: index,
-                found: position,
+            .ok_or_else(|| match scene.tube_around(point) {
+                Some(block) => LightError::OutsideTube {
+                    light: index,
+                    block,
+                    found: position,
+                },
+                None => LightError::OutsideBlocks {
+                    light: index,
+                    found: position,
+                },
             })
     };
     let block = match light {

@@ -154,7 +154,7 @@ const HOLE_LETTERS: [char; 2] = ['d', 'w'];
 /// The hole index of an opening.
 pub fn hole_of(outline: Outline) -> Option<HoleIndex> {
     match outline {
-        Outline::Whole => None,
+        Outline::Whole | Outline::Disc => None,
         Outline::Hole(hole) => Some(hole.index() as HoleIndex),
     }
 }

@@ -3,6 +3,7 @@
 use crate::atlas::AtlasLayout;
 use crate::light::MAX_LIGHT_VALUE;
 use crate::shape::{Aperture, Shape};
+use crate::wall::UnitFromWorld;
 use glam::{DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
@@ -55,6 +56,8 @@ pub struct SceneBlock {
     pub orientation: CubeRotation,
     /// From the canonical cube to the world, metres.
     pub warp: Hexahedron,
+    /// The way back.
+    pub unit_from_world: UnitFromWorld,
     /// What lies beyond each canonical face.
     pub beyond: [Beyond; 6],
     /// Its part of the scene's texels.
@@ -72,12 +75,13 @@ pub struct SceneBlock {
 }
 
 /// An opening's outline in the world.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Portal {
     /// The canonical face.
     pub face: Face,
-    /// Four corners in a loop that runs clockwise seen from inside the block, metres.
-    pub corners: [DVec3; 4],
+    /// Corners in a loop that runs clockwise seen from inside the block, metres: four, or those of a polygon
+    /// around a disc.
+    pub corners: Vec<DVec3>,
     /// Out of the block, at the first corner; not of unit length.
     pub outward: DVec3,
 }
@@ -85,17 +89,31 @@ pub struct Portal {
 impl Portal {
     /// The outline of an opening of a warped cube.
     pub(crate) fn new(warp: &Hexahedron, opening: &Aperture) -> Self {
-        let mut corners = opening.corners().map(|corner| warp.point(corner));
-        let turn = |c: &[DVec3; 4]| (c[1] - c[0]).cross(c[3] - c[0]);
-        let middle = corners.iter().copied().sum::<DVec3>() / 4.0;
+        let mut corners: Vec<DVec3> = opening
+            .corners()
+            .into_iter()
+            .map(|corner| warp.point(corner))
+            .collect();
+        let quarter = corners.len() / 4;
+        let turn = |c: &[DVec3]| (c[quarter] - c[0]).cross(c[3 * quarter] - c[0]);
+        let middle = corners.iter().copied().sum::<DVec3>() / corners.len() as f64;
         if turn(&corners).dot(middle - warp.center()) < 0.0 {
             corners.reverse();
         }
         Self {
             face: opening.face,
-            corners,
             outward: turn(&corners),
+            corners,
         }
+    }
+
+    /// Where a line passes the plane of the opening; the origin if it runs along it.
+    pub(crate) fn crossing(&self, origin: DVec3, direction: DVec3) -> DVec3 {
+        let along = direction.dot(self.outward);
+        if along == 0.0 {
+            return origin;
+        }
+        origin + direction * ((self.corners[0] - origin).dot(self.outward) / along)
     }
 }
 
@@ -214,6 +232,19 @@ pub struct SceneShape {
     pub probe_basis: Matrix<f32>,
     /// 4 texels x joint modes: vector irradiance, or no rows.
     pub vector_basis: Matrix<f32>,
+    /// Area of each texel over that of a cube's; empty for cubes.
+    pub texel_areas: Vec<f32>,
+}
+
+impl SceneBlock {
+    /// True unless a point of the block's cube is outside the round wall in it by more than `tolerance`, in block
+    /// widths.
+    fn is_inside_walls(&self, point: DVec3, tolerance: f64) -> bool {
+        self.shape.tube().is_none()
+            || self
+                .shape
+                .is_inside_walls(self.unit_from_world.point(point), tolerance)
+    }
 }
 
 impl Scene {
@@ -325,13 +356,22 @@ impl Scene {
                 point.cmpge(min - margin).all()
                     && point.cmple(max + margin).all()
                     && block.warp.contains(point, slack)
+                    && block.is_inside_walls(point, slack)
             })
         };
         containing(0.0).or_else(|| containing(tolerance))
     }
 
+    /// The first block whose cube contains a point that is outside the round wall in it.
+    pub(crate) fn tube_around(&self, point: DVec3) -> Option<usize> {
+        let is_around =
+            |block: &SceneBlock| block.shape.tube().is_some() && block.warp.contains(point, 0.0);
+        self.blocks.iter().position(is_around)
+    }
+
     /// Index within a block of the texel at (row, column) of a face *as the level names it*, after
-    /// orientation; `None` for openings and texels that do not exist.
+    /// orientation; `None` for openings and texels that do not exist. Rows and columns of a tube are those of the
+    /// flat face that its chart is named by.
     pub fn level_texel(
         &self,
         block: usize,

@@ -1,18 +1,32 @@
-//! The canonical shapes (Loos et al. 2011, section 6.1): cubes with faces missing, or with a hole in a face.
+//! The canonical shapes (Loos et al. 2011, section 6.1): cubes with faces missing, or with a hole in a face, and
+//! round tubes.
 //!
 //! A shape is data. Adding one means adding a line to [`SHAPES`] and its name to a set of [`SHAPE_SETS`];
-//! everything else, tests included, sweeps over those lists.
+//! everything else, tests included, sweeps over those lists. What a tube's wall looks like is in [`crate::wall`].
 
 use glam::DVec3;
 use mrt_core::cube::Face;
+use mrt_core::tube::{TUBE_RADIUS, TubeForm};
+use std::f64::consts::PI;
 
-/// A unit cube some of whose faces are open, wholly or in part.
+/// A unit cube some of whose faces are open, wholly or in part, or a tube in it.
 #[derive(Debug, PartialEq)]
 pub struct Shape {
     /// Used in level files and on the command line.
     pub name: &'static str,
+    /// What its walls are.
+    pub form: Form,
     /// Where light passes; at most one a face, in the order of [`Face::ALL`].
     pub openings: &'static [Aperture],
+}
+
+/// What the walls of a shape are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Faces of the cube.
+    Cube,
+    /// A round wall, in four charts named by the faces that it does not open through.
+    Tube(TubeForm),
 }
 
 /// An opening of a shape.
@@ -31,7 +45,13 @@ pub enum Outline {
     Whole,
     /// A hole in a wall.
     Hole(Hole),
+    /// The round end of a tube, of radius [`TUBE_RADIUS`] about the middle of the face. Nothing else is there.
+    Disc,
 }
+
+/// Corners of the polygon that stands for a disc. It is drawn around the disc, so that light which grazes the wall
+/// on both sides of an opening passes; at its corners it is 0.002 block widths too wide.
+const DISC_CORNERS: usize = 32;
 
 /// A rectangle in a wall, in the face's (u, v). Both faces that meet at it must see the same rectangle, so it is
 /// symmetric in u.
@@ -65,6 +85,7 @@ impl std::fmt::Display for Outline {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Outline::Whole => "no wall",
+            Outline::Disc => "a tube's end",
             Outline::Hole(Hole::Door) => "a door",
             Outline::Hole(Hole::Window) => "a window",
         })
@@ -72,13 +93,27 @@ impl std::fmt::Display for Outline {
 }
 
 impl Aperture {
-    /// Four corners in the unit cube.
-    pub fn corners(&self) -> [DVec3; 4] {
-        let [u, v] = match self.outline {
-            Outline::Whole => [[0.0, 1.0]; 2],
-            Outline::Hole(hole) => hole.rectangle(),
-        };
-        self.face.rectangle(u, v)
+    /// Corners in the unit cube, in a loop: four, or 32 around a disc.
+    pub fn corners(&self) -> Vec<DVec3> {
+        match self.outline {
+            Outline::Whole => self.face.rectangle([0.0, 1.0], [0.0, 1.0]).to_vec(),
+            Outline::Hole(hole) => {
+                let [u, v] = hole.rectangle();
+                self.face.rectangle(u, v).to_vec()
+            }
+            Outline::Disc => {
+                let step = 2.0 * PI / DISC_CORNERS as f64;
+                let radius = TUBE_RADIUS / (0.5 * step).cos();
+                // Half a step off the axes, so that the loop keeps every symmetry of the square.
+                let angle = |k: usize| (k as f64 + 0.5) * step;
+                (0..DISC_CORNERS)
+                    .map(|k| {
+                        let (sine, cosine) = angle(k).sin_cos();
+                        self.face.point(0.5 + radius * cosine, 0.5 + radius * sine)
+                    })
+                    .collect()
+            }
+        }
     }
 }
 
@@ -105,13 +140,33 @@ const POS_Z: Aperture = whole(Face::PosZ);
 const DOOR: Aperture = hole(Face::PosX, Hole::Door);
 const WINDOW: Aperture = hole(Face::PosX, Hole::Window);
 
+const fn disc(face: Face) -> Aperture {
+    Aperture {
+        face,
+        outline: Outline::Disc,
+    }
+}
+
 const fn shape(name: &'static str, openings: &'static [Aperture]) -> Shape {
-    Shape { name, openings }
+    Shape {
+        name,
+        form: Form::Cube,
+        openings,
+    }
+}
+
+const fn tube(name: &'static str, form: TubeForm, openings: &'static [Aperture]) -> Shape {
+    Shape {
+        name,
+        form: Form::Tube(form),
+        openings,
+    }
 }
 
 /// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six are those with side faces
-/// missing), and rooms with a door or a window.
-pub static SHAPES: [Shape; 14] = [
+/// missing), rooms with a door or a window, and tubes. A left and a right bend are the one `bend`, in two
+/// orientations; so are those that lead up and down.
+pub static SHAPES: [Shape; 16] = [
     shape("closed", &[]),
     shape("dead_end", &[POS_X]),
     shape("straight", &[NEG_X, POS_X]),
@@ -126,10 +181,20 @@ pub static SHAPES: [Shape; 14] = [
     shape("window", &[WINDOW]),
     shape("doorway", &[NEG_X, DOOR]),
     shape("window_end", &[NEG_X, WINDOW]),
+    tube(
+        "tube",
+        TubeForm::Straight,
+        &[disc(Face::NegX), disc(Face::PosX)],
+    ),
+    tube(
+        "bend",
+        TubeForm::Bend,
+        &[disc(Face::PosX), disc(Face::PosZ)],
+    ),
 ];
 
 /// Shapes that are baked together, by name.
-pub static SHAPE_SETS: [(&str, &[&str]); 3] = [
+pub static SHAPE_SETS: [(&str, &[&str]); 4] = [
     (
         "cubes-2d",
         &["closed", "dead_end", "straight", "corner", "tee", "cross"],
@@ -164,6 +229,7 @@ pub static SHAPE_SETS: [(&str, &[&str]); 3] = [
             "window_end",
         ],
     ),
+    ("cylinders", &["tube", "bend"]),
 ];
 
 /// The shapes of a set of [`SHAPE_SETS`].
@@ -172,16 +238,29 @@ pub fn shape_set(name: &str) -> Option<Vec<&'static Shape>> {
     names.iter().map(|name| Shape::from_name(name)).collect()
 }
 
+/// The shapes that are cubes.
+pub fn cubes() -> impl Iterator<Item = &'static Shape> {
+    SHAPES.iter().filter(|shape| shape.form == Form::Cube)
+}
+
 impl Shape {
     /// The shape of that name.
     pub fn from_name(name: &str) -> Option<&'static Shape> {
         SHAPES.iter().find(|shape| shape.name == name)
     }
 
-    /// True when the whole face is missing.
+    /// The form of a tube; `None` for cubes.
+    pub fn tube(&self) -> Option<TubeForm> {
+        match self.form {
+            Form::Cube => None,
+            Form::Tube(form) => Some(form),
+        }
+    }
+
+    /// True when there is no wall in the face: it is missing, or a tube ends there.
     pub fn is_open(&self, face: Face) -> bool {
         self.opening(face)
-            .is_some_and(|opening| opening.outline == Outline::Whole)
+            .is_some_and(|opening| !matches!(opening.outline, Outline::Hole(_)))
     }
 
     /// The opening in a face.
@@ -213,9 +292,16 @@ impl Shape {
     /// Texels in storage order: wall by wall, row (v) by row, column (u) by column, with the centre
     /// in the unit cube.
     pub fn texels(&self, resolution: usize) -> impl Iterator<Item = (Face, DVec3)> + '_ {
+        let tube = self.tube();
         self.walls().flat_map(move |face| {
             (0..resolution).flat_map(move |j| {
-                (0..resolution).map(move |i| (face, face.texel_center(resolution, j, i)))
+                (0..resolution).map(move |i| {
+                    let center = match tube {
+                        None => face.texel_center(resolution, j, i),
+                        Some(form) => form.texel_center(face, resolution, j, i).position,
+                    };
+                    (face, center)
+                })
             })
         })
     }
@@ -316,11 +402,38 @@ mod tests {
             let texels: Vec<_> = shape.texels(4).collect();
             assert_eq!(texels.len(), shape.texel_count(4));
             for face in Face::ALL {
+                let first = match shape.tube() {
+                    None => face.texel_center(4, 0, 0),
+                    Some(form) => form.texel_center(face, 4, 0, 0).position,
+                };
                 match shape.wall_offset(face, 4) {
-                    Some(offset) => assert_eq!(texels[offset], (face, face.texel_center(4, 0, 0))),
+                    Some(offset) => assert_eq!(texels[offset], (face, first)),
                     None => assert!(shape.is_open(face)),
                 }
             }
+        }
+    }
+
+    #[test]
+    fn tubes_open_where_their_forms_do() {
+        for shape in SHAPES.iter() {
+            let Some(form) = shape.tube() else { continue };
+            let openings: Vec<Face> = shape.openings.iter().map(|o| o.face).collect();
+            assert_eq!(openings, form.openings());
+            assert_eq!(shape.walls().collect::<Vec<_>>(), form.charts());
+        }
+    }
+
+    #[test]
+    fn the_polygon_of_a_disc_is_drawn_around_it() {
+        let corners = disc(Face::PosX).corners();
+        let middle = Face::PosX.point(0.5, 0.5);
+        for (k, &corner) in corners.iter().enumerate() {
+            let next = corners[(k + 1) % corners.len()];
+            let edge = 0.5 * (corner + next);
+            // A few roundings.
+            assert!((edge.distance(middle) - TUBE_RADIUS).abs() < 1e-15);
+            assert!(corner.distance(middle) < TUBE_RADIUS + 0.002);
         }
     }
 

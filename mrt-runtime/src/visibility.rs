@@ -1,7 +1,8 @@
 //! Shadows of direct light: by the level's openings, or by rays of the caller's.
 
-use crate::scene::{Beyond, Portal, Scene};
+use crate::scene::{Beyond, Portal, Scene, SceneBlock};
 use glam::DVec3;
+use mrt_core::tube::TubeForm;
 
 /// A surface point that asks for light.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +68,9 @@ impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
 /// Follows the segment from the receiver through connected openings until it is in the light's
 /// block, or outside for lights at infinity; the product of the doors' values on the way.
 ///
-/// Inside a block nothing is in the way: blocks count as convex, as they are unless faces are bent. A line
+/// Inside a cube or a straight tube nothing is in the way: they count as convex, as they are unless faces are
+/// bent. In a bend the part of the segment between its openings is tested in the canonical frame, where it is
+/// straight if the warp is affine; for other warps its ends are exact. A line
 /// that leaves through an opening to the outside reaches lights at infinity, even if other blocks of the
 /// level stand further on.
 fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
@@ -77,11 +80,14 @@ fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: To
     };
     let mut here = receiver.block;
     let mut entered = None;
+    let mut from = receiver.position;
     let mut passed = 1.0;
     // A straight line enters each convex block at most once.
     for _ in 0..scene.blocks.len() {
         if Some(here) == goal {
-            return passed;
+            let to = receiver.position + direction;
+            let is_lit = is_free_inside(&scene.blocks[here], from, to);
+            return if is_lit { passed } else { 0.0 };
         }
         let block = &scene.blocks[here];
         let exit = block.portals.iter().find(|portal| {
@@ -89,6 +95,15 @@ fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: To
         });
         if let Some(door) = exit.and_then(|portal| block.doors[portal.face.index()]) {
             passed *= doors[door as usize];
+        }
+        if let Some(portal) = exit.filter(|_| block.shape.tube() == Some(TubeForm::Bend)) {
+            let to = portal.crossing(receiver.position, direction);
+            if !is_free_inside(block, from, to) {
+                return 0.0;
+            }
+        }
+        if let Some(portal) = exit {
+            from = portal.crossing(receiver.position, direction);
         }
         match exit.map(|portal| block.beyond[portal.face.index()]) {
             Some(Beyond::Block { block, face, .. }) => {
@@ -102,14 +117,55 @@ fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: To
     0.0
 }
 
+/// True if no wall of a bend is between two points of its block, in metres.
+fn is_free_inside(block: &SceneBlock, from: DVec3, to: DVec3) -> bool {
+    match block.shape.tube() {
+        Some(form @ TubeForm::Bend) => {
+            // Texels and lights are on the wall up to the rounding of their positions in the level.
+            let inside = |point| form.drawn_inside(block.unit_from_world.point(point));
+            form.segment_is_free(inside(from), inside(to))
+        }
+        _ => true,
+    }
+}
+
 /// True when the line from `origin` along `direction` passes the portal outwards.
 ///
-/// The line passes a loop when it runs on the same side of all four edges; that depends on the corners
+/// The line passes a loop when it runs on the same side of all edges; that depends on the corners
 /// alone, so the blocks on both sides of an opening agree, bent openings included.
 fn leaves_through(portal: &Portal, origin: DVec3, direction: DVec3) -> bool {
     if direction.dot(portal.outward) <= 0.0 {
         return false;
     }
-    let corners = portal.corners.map(|corner| corner - origin);
-    (0..4).all(|k| corners[k].cross(corners[(k + 1) % 4]).dot(direction) >= 0.0)
+    let corners = &portal.corners;
+    (0..corners.len()).all(|k| {
+        let (corner, next) = (corners[k], corners[(k + 1) % corners.len()]);
+        (corner - origin).cross(next - origin).dot(direction) >= 0.0
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::Shape;
+    use mrt_core::hexahedron::Hexahedron;
+
+    #[test]
+    fn lines_pass_a_disc_where_they_pass_its_plane() {
+        let shape = Shape::from_name("tube").expect("a tube");
+        let warp = Hexahedron::cell(DVec3::ZERO);
+        for opening in shape.openings {
+            let portal = Portal::new(&warp, opening);
+            let outward = opening.face.outward();
+            let origin = DVec3::new(0.5, 0.4, 0.45);
+            for (offset, passes) in [(0.0, true), (0.39, true), (0.41, false)] {
+                for side in [DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+                    let at = opening.face.point(0.5, 0.5) + side * offset;
+                    assert_eq!(leaves_through(&portal, origin, at - origin), passes);
+                    assert!(portal.crossing(origin, at - origin).distance(at) < 1e-12);
+                }
+            }
+            assert!(!leaves_through(&portal, origin, -outward));
+        }
+    }
 }

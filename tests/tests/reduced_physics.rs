@@ -16,7 +16,7 @@ use mrt_dictionary::transport::{block_transport, fold_bounce};
 use mrt_runtime::dictionary::ShapeOperators;
 use mrt_runtime::frame::{Bounces, Frame};
 use mrt_runtime::level::Level;
-use mrt_runtime::shape::SHAPES;
+use mrt_runtime::shape::cubes;
 use mrt_runtime::visibility::Openings;
 
 /// Largest and mean deviation from 1.
@@ -175,7 +175,7 @@ fn all_modes_together_are_the_dense_operator() {
     let closed = closed_cube_bounce(RESOLUTION, Reconstruction::Constant, &Progress::silent())
         .expect("nobody cancels");
     let mut random = Random(1);
-    for shape in SHAPES.iter().filter(|shape| shape.wall_count() > 0) {
+    for shape in cubes().filter(|shape| shape.wall_count() > 0) {
         let bounce = restrict_to_shape(&closed, shape, RESOLUTION);
         let classes = texel_parity_classes(shape, RESOLUTION);
         // A prior that leaves nothing out.

@@ -15,8 +15,8 @@ use std::time::Instant;
 /// Bakes a dictionary of canonical shapes; the same settings give the same bytes.
 #[derive(Clone, Debug, clap::Args)]
 pub struct BakeArgs {
-    /// Shapes to bake: cubes-2d (cubes with side faces missing), cubes-3d (all cubes with faces missing) or
-    /// rooms (cubes-2d, with doors and windows).
+    /// Shapes to bake: cubes-2d (cubes with side faces missing), cubes-3d (all cubes with faces missing),
+    /// rooms (cubes-2d, with doors and windows) or cylinders (round tubes and bends).
     #[arg(long, default_value = "cubes-2d")]
     pub set: String,
     /// Quality and size: mobile, standard or quality.
@@ -169,7 +169,7 @@ fn check_folder(file: &Path) -> Result<(), BakeError> {
 }
 
 fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
-    let mut config = BakeConfig::preset(&args.preset)?;
+    let mut config = BakeConfig::preset_for(&args.preset, &args.set)?;
     let overrides = [
         (args.resolution, &mut config.resolution),
         (args.modes, &mut config.modes),
@@ -201,7 +201,6 @@ fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {
         }
         None => {}
     }
-    config.shapes = args.set.clone();
     config.outputs.vector |= args.vector;
     if changed {
         config.preset = format!("{} (changed)", args.preset);
