@@ -15,6 +15,7 @@ use glam::{DVec3, IVec3};
 use mrt_core::cube::Face;
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
+use mrt_core::parity::ParityClasses;
 use mrt_core::svd::{largest_entry_sign, symmetric_eigen};
 use mrt_runtime::path::frame_of_heading;
 use mrt_runtime::shape::Shape;
@@ -46,6 +47,15 @@ pub struct JointBasis {
     pub dropped_energy: f64,
 }
 
+/// Light that enters through one opening of a shape, in one of its frames.
+#[derive(Clone, Debug)]
+pub struct ForeignLight {
+    /// Outputs of the shape (texels, then weighted samples of probes) x response modes.
+    pub field: Matrix<f64>,
+    /// 4 texels x response modes, or no rows.
+    pub vector: Matrix<f64>,
+}
+
 /// Adds up to `extra` modes to a shape's own for the responses that enter through its openings.
 pub fn joint_basis(
     shape: &Shape,
@@ -56,18 +66,12 @@ pub fn joint_basis(
     extra: usize,
     has_exchanges: bool,
 ) -> JointBasis {
-    let samples = ProbeSamples::default();
-    let texels = own.irradiance.rows();
-    let base = stack(&own.irradiance, &samples.from_sh(&own.probes, PROBE_WEIGHT));
-    // The coefficients of U_b's columns whose sum is nearest to a signal.
-    let base_gram = transpose_multiply(base.view(), base.view());
-    let nearest = multiply(pseudo_inverse(&base_gram).view(), base.transposed().view());
     let exchanges: &[bool] = if has_exchanges {
         &[false, true]
     } else {
         &[false]
     };
-    let mut responses = Vec::new();
+    let mut foreign = Vec::new();
     for opening in shape.openings {
         for &is_exchanged in exchanges {
             let (field, vector) = response_at(
@@ -78,24 +82,50 @@ pub fn joint_basis(
                 resolution,
                 probes,
             );
+            foreign.push(ForeignLight { field, vector });
+        }
+    }
+    let classes = output_parity_classes(shape, resolution, probes);
+    joint_basis_of(
+        own,
+        foreign,
+        &response.scales,
+        &classes,
+        extra,
+        exchanges.len(),
+    )
+}
+
+/// As [`joint_basis`], for any light: `foreign` lists `frames` for each opening, `scales` say how much each response
+/// mode counts, and `classes` are symmetries of the outputs.
+pub fn joint_basis_of(
+    own: &OwnLight,
+    foreign: Vec<ForeignLight>,
+    scales: &[f64],
+    classes: &ParityClasses,
+    extra: usize,
+    frames: usize,
+) -> JointBasis {
+    let samples = ProbeSamples::default();
+    let texels = own.irradiance.rows();
+    let base = stack(&own.irradiance, &samples.from_sh(&own.probes, PROBE_WEIGHT));
+    // The coefficients of U_b's columns whose sum is nearest to a signal.
+    let base_gram = transpose_multiply(base.view(), base.view());
+    let nearest = multiply(pseudo_inverse(&base_gram).view(), base.transposed().view());
+    let responses: Vec<Response> = foreign
+        .into_iter()
+        .map(|ForeignLight { field, vector }| {
             let of_base = multiply(nearest.view(), field.view());
             let rest = difference(&field, &multiply(base.view(), of_base.view()));
-            responses.push(Response {
+            Response {
                 field,
                 vector,
                 of_base,
                 rest,
-            });
-        }
-    }
-    let found = extra_modes(
-        shape,
-        &responses,
-        &response.scales,
-        resolution,
-        probes,
-        extra,
-    );
+            }
+        })
+        .collect();
+    let found = extra_modes(classes, &responses, scales, extra);
     let (mut irradiance, mut vector) = (own.irradiance.clone(), own.vector.clone());
     let mut probe_samples = rows(&base, texels..base.rows());
     for weights in &found.weights {
@@ -127,10 +157,10 @@ pub fn joint_basis(
         probes: samples.to_sh(&probe_samples, PROBE_WEIGHT),
         vector,
         joint_from_response: operators
-            .chunks(exchanges.len())
+            .chunks(frames)
             .map(<[Matrix<f64>]>::to_vec)
             .collect(),
-        dropped_energy: found.dropped_energy(&responses, &response.scales),
+        dropped_energy: found.dropped_energy(&responses, scales),
     }
 }
 
@@ -147,7 +177,7 @@ struct Response {
 }
 
 /// Response modes brought to the walls, probes and vector irradiance of a shape behind one of its openings.
-fn response_at(
+pub fn response_at(
     shape: &Shape,
     opening: Face,
     is_exchanged: bool,
@@ -238,11 +268,9 @@ impl Extra {
 
 /// The largest singular vectors of what is left of all responses, class by class (method of snapshots).
 fn extra_modes(
-    shape: &Shape,
+    classes: &ParityClasses,
     responses: &[Response],
     scales: &[f64],
-    resolution: usize,
-    probes: usize,
     extra: usize,
 ) -> Extra {
     if responses.is_empty() || extra == 0 {
@@ -251,7 +279,6 @@ fn extra_modes(
             kept_energy: 0.0,
         };
     }
-    let classes = output_parity_classes(shape, resolution, probes);
     let columns: Vec<(usize, usize)> = (0..responses.len())
         .flat_map(|r| (0..scales.len()).map(move |k| (r, k)))
         .collect();

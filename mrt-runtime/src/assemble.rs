@@ -1,7 +1,8 @@
 //! Joins a level and a dictionary into a scene (Loos et al. 2011, sections 6.2 and 6.3).
 
 use crate::atlas::AtlasLayout;
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, ShapeOperators, WarpTransport};
+use crate::form::form_of;
 use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::path::hole_of;
 use crate::propagate;
@@ -64,6 +65,19 @@ pub enum AssembleError {
         /// Shapes in the dictionary.
         expected: String,
     },
+    /// A block wants operators for its warp that nobody has made.
+    #[error(
+        "block {block}: the dictionary has no {transport} operators for its shape `{shape}` in this form; run \
+         `mrt adapt` on the level, or set its transport to \"canonical\""
+    )]
+    MissingVariant {
+        /// Which block.
+        block: usize,
+        /// Its shape.
+        shape: &'static str,
+        /// [`WarpTransport::name`] of what it wants.
+        transport: &'static str,
+    },
     /// More openings than paths are followed through.
     #[error("light may cross {found} openings; expected at most {MAX_DEPTH}")]
     Depth {
@@ -117,8 +131,8 @@ pub fn assemble(
             found: config.max_depth,
         });
     }
-    let used = used_shapes(level, dictionary)?;
-    let blocks = place_blocks(level, dictionary, &used)?;
+    let (used, operators_of_block) = used_operators(level, dictionary)?;
+    let blocks = place_blocks(level, dictionary, &used, &operators_of_block)?;
     let resolution = dictionary.resolution;
     let texel_bytes = BYTES_PER_TEXEL * blocks.last().map_or(0, |b| b.texels.end);
     let operator_bytes =
@@ -131,10 +145,7 @@ pub fn assemble(
             })?;
     let mut scene = Scene {
         resolution,
-        shapes: used
-            .iter()
-            .map(|&index| scene_shape(dictionary, index))
-            .collect(),
+        shapes: used.iter().map(|&entry| scene_shape(entry)).collect(),
         texel_positions: Vec::new(),
         texel_normals: Vec::new(),
         texel_albedo: Vec::new(),
@@ -156,9 +167,13 @@ pub fn assemble(
     Ok(scene)
 }
 
-/// Dictionary positions of the shapes that the level uses, in dictionary order.
-fn used_shapes(level: &Level, dictionary: &Dictionary) -> Result<Vec<usize>, AssembleError> {
-    let mut used = vec![false; dictionary.shapes.len()];
+/// The operators that the level uses, each once, and for each block which of them.
+fn used_operators<'a>(
+    level: &Level,
+    dictionary: &'a Dictionary,
+) -> Result<(Vec<&'a ShapeOperators>, Vec<usize>), AssembleError> {
+    let mut used: Vec<&ShapeOperators> = Vec::new();
+    let mut of_block = Vec::with_capacity(level.blocks.len());
     for (index, block) in level.blocks.iter().enumerate() {
         let position =
             dictionary
@@ -173,26 +188,40 @@ fn used_shapes(level: &Level, dictionary: &Dictionary) -> Result<Vec<usize>, Ass
                         .collect::<Vec<_>>()
                         .join(", "),
                 })?;
-        used[position] = true;
+        let entry = match block.transport {
+            WarpTransport::Canonical => &dictionary.shapes[position],
+            transport => {
+                let variant = dictionary.variant(block.shape, transport, &form_of(block));
+                let missing = || AssembleError::MissingVariant {
+                    block: index,
+                    shape: block.shape.name,
+                    transport: transport.name(),
+                };
+                &variant.ok_or_else(missing)?.operators
+            }
+        };
+        let known = used.iter().position(|&other| std::ptr::eq(other, entry));
+        of_block.push(known.unwrap_or_else(|| {
+            used.push(entry);
+            used.len() - 1
+        }));
     }
-    Ok((0..used.len()).filter(|&k| used[k]).collect())
+    Ok((used, of_block))
 }
 
 fn place_blocks(
     level: &Level,
     dictionary: &Dictionary,
-    used: &[usize],
+    used: &[&ShapeOperators],
+    operators_of_block: &[usize],
 ) -> Result<Vec<SceneBlock>, AssembleError> {
     let neighbours = level.neighbours();
     let doors = level.door_of_openings();
     let mut blocks = Vec::with_capacity(level.blocks.len());
     let (mut texel, mut coefficient, mut joint) = (0, 0, 0);
     for (index, block) in level.blocks.iter().enumerate() {
-        let shape_index = used
-            .iter()
-            .position(|&k| dictionary.shapes[k].shape == block.shape)
-            .unwrap_or(0);
-        let entry = &dictionary.shapes[used[shape_index]];
+        let shape_index = operators_of_block[index];
+        let entry = used[shape_index];
         let (modes, joint_modes) = (entry.modes(), entry.joint_modes());
         let texels = block.shape.texel_count(dictionary.resolution);
         let mut beyond = [Beyond::Wall; 6];
@@ -334,8 +363,7 @@ fn place_texels(scene: &mut Scene, level: &Level) {
     }
 }
 
-fn scene_shape(dictionary: &Dictionary, index: usize) -> SceneShape {
-    let entry = &dictionary.shapes[index];
+fn scene_shape(entry: &ShapeOperators) -> SceneShape {
     SceneShape {
         coefficients_from_direct: entry.coefficients_from_direct.clone(),
         joint_basis: entry.joint_basis.clone(),

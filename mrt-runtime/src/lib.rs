@@ -43,6 +43,7 @@ pub mod shape;
 pub mod path;
 pub mod level;
 pub mod level_text;
+pub mod form;
 mod overlap;
 pub mod dictionary;
 pub mod dictionary_file;

@@ -11,7 +11,7 @@ mod lightfield;
 mod table;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
-use crate::dictionary::Dictionary;
+use crate::dictionary::{Dictionary, ShapeOperators};
 use crate::path::Roll;
 use crate::scene::{Gate, Scene, Transport};
 use mrt_core::block_sparse::BlockSparse;
@@ -39,7 +39,7 @@ struct ArrivalKey {
 pub(crate) fn joint_from_coefficients(
     scene: &Scene,
     dictionary: &Dictionary,
-    used_shapes: &[usize],
+    used_shapes: &[&ShapeOperators],
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
@@ -53,7 +53,7 @@ pub(crate) fn joint_from_coefficients(
                 lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)
             }
         };
-        for (doors, block, joint) in project(scene, dictionary, used_shapes, arrivals) {
+        for (doors, block, joint) in project(scene, used_shapes, arrivals) {
             bytes += std::mem::size_of_val(joint.data());
             if bytes > max_bytes {
                 return Err(AssembleError::TooLarge {
@@ -82,14 +82,13 @@ pub(crate) fn joint_from_coefficients(
 /// Projects responses on the joint bases, and sums those of one block behind the same doors.
 fn project(
     scene: &Scene,
-    dictionary: &Dictionary,
-    used_shapes: &[usize],
+    used_shapes: &[&ShapeOperators],
     arrivals: Arrivals,
 ) -> Vec<(Vec<u32>, usize, Matrix<f32>)> {
     let mut sums: Vec<(Vec<u32>, usize, Matrix<f32>)> = Vec::new();
     for (key, responses) in arrivals {
         let placed = &scene.blocks[key.block];
-        let entry = &dictionary.shapes[used_shapes[placed.shape_index]];
+        let entry = used_shapes[placed.shape_index];
         let opening = placed
             .shape
             .openings

@@ -4,7 +4,7 @@
 //! open rooms have binomially many.
 
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, LightfieldOperators};
+use crate::dictionary::{Dictionary, LightfieldOperators, ShapeOperators};
 use crate::path::{Roll, frame_of_heading, hole_of};
 use crate::scene::{Beyond, Scene};
 use mrt_core::cube::{CubeRotation, Face};
@@ -41,13 +41,13 @@ type Front = BTreeMap<WaveKey, Wave>;
 pub(super) fn follow(
     scene: &Scene,
     dictionary: &Dictionary,
-    used_shapes: &[usize],
+    used_shapes: &[&ShapeOperators],
     source: usize,
     max_depth: usize,
 ) -> Arrivals {
     let fields = &dictionary.lightfields;
     let block = &scene.blocks[source];
-    let emission = &dictionary.shapes[used_shapes[block.shape_index]].openings;
+    let emission = &used_shapes[block.shape_index].openings;
     let mut front = Front::new();
     for (aperture, operators) in block.shape.openings.iter().zip(emission) {
         let sent = Sent {

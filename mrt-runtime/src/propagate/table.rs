@@ -5,7 +5,7 @@
 //! of one small matrix.
 
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, PathEntry};
+use crate::dictionary::{Dictionary, PathEntry, ShapeOperators};
 use crate::path::{Crossing, Roll, Word, frame_of_heading, hole_of, response_frame};
 use crate::scene::{Beyond, Scene};
 use mrt_core::cube::{CubeRotation, Face};
@@ -18,7 +18,7 @@ use std::rc::Rc;
 pub(super) struct Table<'a> {
     scene: &'a Scene,
     dictionary: &'a Dictionary,
-    used_shapes: &'a [usize],
+    used_shapes: &'a [&'a ShapeOperators],
     max_depth: usize,
     /// Responses from coefficients by (shape, opening, word, frame's roll).
     cache: HashMap<(usize, usize, usize, bool, u8), Rc<Matrix<f32>>>,
@@ -40,7 +40,7 @@ impl<'a> Table<'a> {
     pub(super) fn new(
         scene: &'a Scene,
         dictionary: &'a Dictionary,
-        used_shapes: &'a [usize],
+        used_shapes: &'a [&'a ShapeOperators],
         max_depth: usize,
     ) -> Self {
         Self {
@@ -163,7 +163,7 @@ impl<'a> Table<'a> {
         self.cache
             .entry(key)
             .or_insert_with(|| {
-                let operators = &dictionary.shapes[used].openings[opening];
+                let operators = &used.openings[opening];
                 let exchanged = usize::from(roll.exchanged);
                 // Without vertical openings every frame keeps up, and there is one.
                 let emission = operators
