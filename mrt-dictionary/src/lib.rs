@@ -34,6 +34,7 @@ pub mod warp_error;
 pub mod warped_outputs;
 pub mod warped_openings;
 pub mod variants;
+pub mod warp_advice;
 pub mod tube_bounce;
 pub mod tube_prior;
 pub mod tube_lightfield;

@@ -247,7 +247,7 @@ mod tests {
         let folded = fold_bounce(&cube, &classes);
         let samples = direct_samples(shape, RESOLUTION, &prior_config);
         let prior = light_prior(&samples, &classes, usize::MAX);
-        let plain = block_transport(&folded, &prior.basis, &classes, 20);
+        let plain = block_transport(&folded, &folded, &prior.basis, &classes, 20);
         let enriched = enriched_prior(
             &prior,
             &plain.indirect_basis,
@@ -255,7 +255,7 @@ mod tests {
             &classes,
             &Enrichment::default(),
         );
-        let baked = block_transport(&folded, &enriched.basis, &classes, 20);
+        let baked = block_transport(&folded, &folded, &enriched.basis, &classes, 20);
 
         let walls = WarpedWalls::new(&Face::ALL, RESOLUTION, &Hexahedron::cell(DVec3::ZERO));
         let bounce = warped_bounce(&walls);

@@ -9,6 +9,7 @@
 
 mod lightfield;
 mod table;
+mod transit;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::{Dictionary, ShapeOperators};
@@ -19,6 +20,7 @@ use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, multiply_add};
 use std::collections::BTreeMap;
+use transit::Transits;
 
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
@@ -43,14 +45,16 @@ pub(crate) fn joint_from_coefficients(
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
-    let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
+    let transits = Transits::new(scene, dictionary, used_shapes);
+    let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
     let mut gated: BTreeMap<Vec<u32>, Vec<(usize, usize, Matrix<f32>)>> = BTreeMap::new();
     let mut bytes = 0;
     for source in 0..scene.blocks.len() {
         let arrivals = match config.coupling {
             Coupling::Table => table.follow(source),
             Coupling::Lightfield => {
-                lightfield::follow(scene, dictionary, used_shapes, source, config.max_depth)
+                let operators = (used_shapes, &transits);
+                lightfield::follow(scene, dictionary, operators, source, config.max_depth)
             }
         };
         for (doors, block, joint) in project(scene, used_shapes, arrivals) {
@@ -115,14 +119,14 @@ fn project(
     sums
 }
 
-/// Adds responses, brought to the frame without mirrors, to those that enter at the same place.
+/// Adds responses times a factor, brought to the frame without mirrors, to those that enter at the same place.
 fn arrive(
     arrivals: &mut Arrivals,
     doors: &[u32],
     (block, face): (usize, Face),
     target_frame: CubeSymmetry,
     parity: &[u8],
-    responses: &Matrix<f32>,
+    (responses, factor): (&Matrix<f32>, f32),
 ) {
     let roll = Roll::of(target_frame);
     let key = ArrivalKey {
@@ -141,7 +145,7 @@ fn arrive(
         .zip(responses.data().chunks_exact(rows))
     {
         for ((to, &from), &parity) in to.iter_mut().zip(from).zip(parity) {
-            *to += roll.sign(parity) * from;
+            *to += factor * roll.sign(parity) * from;
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Sequences that reach an opening with the same set of headings behind them are summed before they go on, since
 //! open rooms have binomially many.
 
+use super::transit::Transits;
 use super::{Arrivals, arrive, compose, with_door};
 use crate::dictionary::{Dictionary, LightfieldOperators, ShapeOperators};
 use crate::path::{Roll, frame_of_heading, hole_of};
@@ -41,7 +42,7 @@ type Front = BTreeMap<WaveKey, Wave>;
 pub(super) fn follow(
     scene: &Scene,
     dictionary: &Dictionary,
-    used_shapes: &[&ShapeOperators],
+    (used_shapes, transits): (&[&ShapeOperators], &Transits),
     source: usize,
     max_depth: usize,
 ) -> Arrivals {
@@ -79,7 +80,7 @@ pub(super) fn follow(
                 (key.block, key.entered),
                 target_frame,
                 &dictionary.paths.response_parity,
-                &responses,
+                (&responses, 1.0),
             );
             if depth == max_depth {
                 continue;
@@ -92,7 +93,11 @@ pub(super) fn follow(
                 if turns_back || !leads_on || aperture.face == key.entered {
                     continue;
                 }
-                let (frame, lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+                let (frame, mut lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+                let factor = transits.factor(here, key.entered, aperture.face);
+                if factor != 1.0 {
+                    lightfield.data_mut().iter_mut().for_each(|x| *x *= factor);
+                }
                 let sent = Sent {
                     block: key.block,
                     exit: aperture.face,

@@ -4,6 +4,7 @@
 //! binomially many, which bounds the depth of a table rather than that of a level: adding one costs the additions
 //! of one small matrix.
 
+use super::transit::Transits;
 use super::{Arrivals, arrive, compose, with_door};
 use crate::dictionary::{Dictionary, PathEntry, ShapeOperators};
 use crate::path::{Crossing, Roll, Word, frame_of_heading, hole_of, response_frame};
@@ -19,6 +20,7 @@ pub(super) struct Table<'a> {
     scene: &'a Scene,
     dictionary: &'a Dictionary,
     used_shapes: &'a [&'a ShapeOperators],
+    transits: &'a Transits,
     max_depth: usize,
     /// Responses from coefficients by (shape, opening, word, frame's roll).
     cache: HashMap<(usize, usize, usize, bool, u8), Rc<Matrix<f32>>>,
@@ -34,6 +36,8 @@ struct Path {
     x: Option<Face>,
     y: Option<Face>,
     doors: Vec<u32>,
+    /// Product of the transits so far.
+    factor: f32,
 }
 
 impl<'a> Table<'a> {
@@ -41,12 +45,14 @@ impl<'a> Table<'a> {
         scene: &'a Scene,
         dictionary: &'a Dictionary,
         used_shapes: &'a [&'a ShapeOperators],
+        transits: &'a Transits,
         max_depth: usize,
     ) -> Self {
         Self {
             scene,
             dictionary,
             used_shapes,
+            transits,
             max_depth,
             cache: HashMap::new(),
         }
@@ -64,6 +70,7 @@ impl<'a> Table<'a> {
                 x: None,
                 y: None,
                 doors: Vec::new(),
+                factor: 1.0,
             };
             self.cross(source, opening, aperture.face, &start, &mut arrivals);
         }
@@ -108,13 +115,14 @@ impl<'a> Table<'a> {
         let Some(index) = self.entry(&word) else {
             return;
         };
-        let next = Path {
+        let mut next = Path {
             word,
             block,
             source_from_here: compose(path.source_from_here, here_from_there),
             x,
             y,
             doors: with_door(&path.doors, here.doors[exit.index()]),
+            factor: path.factor,
         };
         let frame = path_frame(first, x, y);
         let responses = self.responses(source, opening, index, frame);
@@ -127,7 +135,7 @@ impl<'a> Table<'a> {
             (block, entered),
             target_frame,
             &self.dictionary.paths.response_parity,
-            &responses,
+            (&responses, path.factor),
         );
         if next.word.crossings().len() >= self.max_depth {
             return;
@@ -136,6 +144,9 @@ impl<'a> Table<'a> {
             let heading = next.source_from_here.face(aperture.face);
             let used = [Some(first), next.x, next.y];
             if !used.contains(&Some(heading.opposite())) {
+                let there = &self.scene.blocks[block];
+                let transit = self.transits.factor(there, entered, aperture.face);
+                next.factor = path.factor * transit;
                 self.cross(source, opening, aperture.face, &next, arrivals);
             }
         }

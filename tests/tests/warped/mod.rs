@@ -33,10 +33,10 @@ pub fn canonical(shape: &Shape) -> BlockTransport {
     let folded = fold_bounce(&restrict_to_shape(&closed, shape, RESOLUTION), &classes);
     let samples = direct_samples(shape, RESOLUTION, &PriorConfig::default());
     let prior = light_prior(&samples, &classes, usize::MAX);
-    let plain = block_transport(&folded, &prior.basis, &classes, MODES);
+    let plain = block_transport(&folded, &folded, &prior.basis, &classes, MODES);
     let weights = Enrichment::default();
     let enriched = enriched_prior(&prior, &plain.indirect_basis, shape, &classes, &weights);
-    block_transport(&folded, &enriched.basis, &classes, MODES)
+    block_transport(&folded, &folded, &enriched.basis, &classes, MODES)
 }
 
 /// A warped block with the transport of each of the three levels.
