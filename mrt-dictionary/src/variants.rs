@@ -5,8 +5,7 @@
 
 use crate::bounce::wall_fraction;
 use crate::config::{Enrichment, PriorConfig};
-use crate::emission::emitter_radiosity;
-use crate::joint::{ForeignLight, JointBasis, OwnLight, joint_basis_of, response_at};
+use crate::joint::{ForeignLight, JointBasis, OwnLight, joint_basis_of};
 use crate::outputs::{PROBE_WEIGHT, ProbeSamples, probe_points};
 use crate::path_transport::RECEIVER;
 use crate::progress::{Cancelled, Progress};
@@ -25,7 +24,7 @@ use mrt_runtime::dictionary::{
 };
 use mrt_runtime::form::{Form, form_of, same_form, warp_of};
 use mrt_runtime::level::Level;
-use mrt_runtime::shape::{Aperture, Outline, Shape};
+use mrt_runtime::shape::Outline;
 
 /// What making variants is free to choose.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,18 +33,6 @@ pub struct VariantConfig {
     pub prior: PriorConfig,
     /// Appendix A for rebuilding.
     pub enrichment: Option<Enrichment>,
-    /// How light passes a warped block's openings.
-    pub openings: OpeningTransfer,
-}
-
-/// How light passes a warped block's openings.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum OpeningTransfer {
-    /// As the canonical shape's, texel by texel: the paper's way.
-    Scaled,
-    /// As seen from the opening ([`crate::warped_openings`]).
-    #[default]
-    Viewed,
 }
 
 impl Default for VariantConfig {
@@ -53,7 +40,6 @@ impl Default for VariantConfig {
         Self {
             prior: PriorConfig::default(),
             enrichment: Some(Enrichment::default()),
-            openings: OpeningTransfer::default(),
         }
     }
 }
@@ -348,12 +334,13 @@ impl Maker<'_> {
 
     /// What enters through each opening, in each frame.
     fn foreign_light(&self, walls: &WarpedWalls, frames: usize) -> Vec<ForeignLight> {
-        let (resolution, probes) = (self.dictionary.resolution, self.dictionary.probes);
+        let probes = self.dictionary.probes;
         let canonical = self.canonical;
         let shape = canonical.shape;
         let vector_basis: Matrix<f64> = canonical.vector_basis.cast();
         let mut all = Vec::with_capacity(shape.openings.len() * frames);
         for (aperture, operators) in shape.openings.iter().zip(&canonical.openings) {
+            let view = OpeningView::new(shape, walls, aperture);
             for (frame, joint_from_response) in operators.joint_from_response.iter().enumerate() {
                 let is_exchanged = frame == 1;
                 // Response modes are stored without directions; the canonical joint basis has them.
@@ -361,26 +348,7 @@ impl Maker<'_> {
                     0 => Matrix::zeros(0, joint_from_response.columns()),
                     _ => multiply(vector_basis.view(), joint_from_response.cast().view()),
                 };
-                all.push(match self.config.openings {
-                    OpeningTransfer::Viewed => OpeningView::new(shape, walls, aperture).response(
-                        is_exchanged,
-                        self.response,
-                        probes,
-                        &vector,
-                    ),
-                    OpeningTransfer::Scaled => {
-                        let field = response_at(
-                            shape,
-                            aperture.face,
-                            is_exchanged,
-                            self.response,
-                            resolution,
-                            probes,
-                        )
-                        .0;
-                        ForeignLight { field, vector }
-                    }
-                });
+                all.push(view.response(is_exchanged, self.response, probes, &vector));
             }
         }
         all
@@ -397,38 +365,17 @@ impl Maker<'_> {
         let openings = self.canonical.shape.openings.iter();
         openings
             .zip(&joint.joint_from_response)
-            .map(|(aperture, joint_from_response)| OpeningOperators {
-                emission_from_coefficients: (0..frames)
-                    .map(|frame| {
-                        let sent = self.sent(walls, aperture, frame == 1, implicit_lighting);
-                        multiply(from_radiosity.view(), sent.view()).cast()
-                    })
-                    .collect(),
-                joint_from_response: joint_from_response.iter().map(Matrix::cast).collect(),
+            .map(|(aperture, joint_from_response)| {
+                let view = OpeningView::new(self.canonical.shape, walls, aperture);
+                let emission = (0..frames).map(|frame| {
+                    let sent = view.emitter_radiosity(frame == 1, implicit_lighting);
+                    multiply(from_radiosity.view(), sent.view()).cast()
+                });
+                OpeningOperators {
+                    emission_from_coefficients: emission.collect(),
+                    joint_from_response: joint_from_response.iter().map(Matrix::cast).collect(),
+                }
             })
             .collect()
-    }
-
-    /// Radiosity of the canonical emitter behind an opening.
-    fn sent(
-        &self,
-        walls: &WarpedWalls,
-        aperture: &'static Aperture,
-        is_exchanged: bool,
-        radiosity: &Matrix<f64>,
-    ) -> Matrix<f64> {
-        let shape: &'static Shape = self.canonical.shape;
-        match self.config.openings {
-            OpeningTransfer::Viewed => {
-                OpeningView::new(shape, walls, aperture).emitter_radiosity(is_exchanged, radiosity)
-            }
-            OpeningTransfer::Scaled => emitter_radiosity(
-                shape,
-                aperture.face,
-                is_exchanged,
-                radiosity,
-                self.dictionary.resolution,
-            ),
-        }
     }
 }
