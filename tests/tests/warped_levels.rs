@@ -119,7 +119,9 @@ fn indirect(level: &Level, direct: &[f64]) -> Vec<f64> {
     let numbers: Vec<f32> = (0..3 * scene.texel_count()).map(|k| k as f32).collect();
     let mut frame_direct = vec![0.0; numbers.len()];
     for (places, &e) in in_level_order(level, &scene, &numbers).iter().zip(direct) {
-        places.map(|place| frame_direct[place as usize] = e as f32);
+        for place in places {
+            frame_direct[*place as usize] = e as f32;
+        }
     }
     let mut frame = Frame::new(&scene);
     frame
@@ -258,7 +260,17 @@ fn every_transport_improves_on_the_one_before() {
     }
 }
 
-const BOUNDS: [[f64; 5]; 8] = [[1.0, 1.0, 1.0, 1.0, 1.0]; 8];
+const BOUNDS: [[f64; 5]; 8] = [
+    // Eight texels along a hall of four: 8 % is what they miss.
+    [0.40, 0.17, 0.085, 0.17, 0.085],
+    [0.47, 0.036, 0.013, 0.08, 0.022],
+    [0.45, 0.175, 0.125, 0.18, 0.20],
+    [0.25, 0.028, 0.021, 0.125, 0.125],
+    [0.155, 0.014, 0.014, 0.17, 0.172],
+    [0.12, 0.066, 0.064, 0.09, 0.09],
+    [0.055, 0.020, 0.018, 0.033, 0.031],
+    [0.072, 0.019, 0.019, 0.06, 0.06],
+];
 
 /// Only the stretched blocks of a level with cubes need operators of their own.
 #[test]
