@@ -261,7 +261,7 @@ fn every_transport_improves_on_the_one_before() {
 }
 
 const BOUNDS: [[f64; 5]; 8] = [
-    // Eight texels along a hall of four: 8 % is what they miss.
+    // Eight texels along a hall of four are coarse; `great_hall.rs` has it at sixteen.
     [0.40, 0.17, 0.085, 0.17, 0.085],
     [0.47, 0.036, 0.013, 0.08, 0.022],
     [0.45, 0.175, 0.125, 0.18, 0.20],

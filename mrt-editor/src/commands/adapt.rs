@@ -186,7 +186,7 @@ fn check(args: &AdaptArgs) -> Result<(), AdaptError> {
         ("threshold-rebuild", args.threshold_rebuild),
     ] {
         // NaN is refused too.
-        if !(found >= 0.0) {
+        if !(0.0..=f64::MAX).contains(&found) {
             return Err(AdaptError::Threshold { name, found });
         }
     }
