@@ -47,6 +47,15 @@ pub struct JointBasis {
     pub dropped_energy: f64,
 }
 
+/// Light that enters through one opening of a shape, in one of its frames.
+#[derive(Clone, Debug)]
+pub struct ForeignLight {
+    /// Outputs of the shape (texels, then weighted samples of probes) x response modes.
+    pub field: Matrix<f64>,
+    /// 4 texels x response modes, or no rows.
+    pub vector: Matrix<f64>,
+}
+
 /// Adds up to `extra` modes to a shape's own for the responses that enter through its openings.
 pub fn joint_basis(
     shape: &Shape,
@@ -62,49 +71,40 @@ pub fn joint_basis(
     } else {
         &[false]
     };
-    let arriving = shape
-        .openings
-        .iter()
-        .flat_map(|opening| {
-            exchanges
-                .iter()
-                .map(|&is_exchanged| (opening.face, is_exchanged))
-        })
-        .map(|(face, is_exchanged)| {
-            let (field, vector) =
-                response_at(shape, face, is_exchanged, response, resolution, probes);
-            Arriving { field, vector }
-        })
-        .collect();
+    let mut foreign = Vec::new();
+    for opening in shape.openings {
+        for &is_exchanged in exchanges {
+            let (field, vector) = response_at(
+                shape,
+                opening.face,
+                is_exchanged,
+                response,
+                resolution,
+                probes,
+            );
+            foreign.push(ForeignLight { field, vector });
+        }
+    }
     let classes = output_parity_classes(shape, resolution, probes);
-    joint_of(
+    joint_basis_of(
         own,
-        arriving,
-        &classes,
+        foreign,
         &response.scales,
+        &classes,
         extra,
         exchanges.len(),
     )
 }
 
-/// Light that enters a shape in one way.
-#[derive(Clone, Debug)]
-pub struct Arriving {
-    /// Outputs of the shape (texels, then samples of probes) x response modes.
-    pub field: Matrix<f64>,
-    /// 4 texels x response modes, or no rows.
-    pub vector: Matrix<f64>,
-}
-
-/// Adds up to `extra` modes to a shape's own for the given responses, whose modes count by their `scales`; `ways` of
-/// them enter at each opening.
-pub fn joint_of(
+/// As [`joint_basis`], for any light: `foreign` lists `frames` for each opening, `scales` say how much each response
+/// mode counts, and `classes` are symmetries of the outputs.
+pub fn joint_basis_of(
     own: &OwnLight,
-    arriving: Vec<Arriving>,
-    classes: &ParityClasses,
+    foreign: Vec<ForeignLight>,
     scales: &[f64],
+    classes: &ParityClasses,
     extra: usize,
-    ways: usize,
+    frames: usize,
 ) -> JointBasis {
     let samples = ProbeSamples::default();
     let texels = own.irradiance.rows();
@@ -112,9 +112,9 @@ pub fn joint_of(
     // The coefficients of U_b's columns whose sum is nearest to a signal.
     let base_gram = transpose_multiply(base.view(), base.view());
     let nearest = multiply(pseudo_inverse(&base_gram).view(), base.transposed().view());
-    let responses: Vec<Response> = arriving
+    let responses: Vec<Response> = foreign
         .into_iter()
-        .map(|Arriving { field, vector }| {
+        .map(|ForeignLight { field, vector }| {
             let of_base = multiply(nearest.view(), field.view());
             let rest = difference(&field, &multiply(base.view(), of_base.view()));
             Response {
@@ -157,7 +157,7 @@ pub fn joint_of(
         probes: samples.to_sh(&probe_samples, PROBE_WEIGHT),
         vector,
         joint_from_response: operators
-            .chunks(ways)
+            .chunks(frames)
             .map(<[Matrix<f64>]>::to_vec)
             .collect(),
         dropped_energy: found.dropped_energy(&responses, scales),
@@ -177,7 +177,7 @@ struct Response {
 }
 
 /// Response modes brought to the walls, probes and vector irradiance of a shape behind one of its openings.
-fn response_at(
+pub fn response_at(
     shape: &Shape,
     opening: Face,
     is_exchanged: bool,

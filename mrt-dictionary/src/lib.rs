@@ -8,7 +8,8 @@
 //! [`tube_response`], called by [`tube_bake`].
 //!
 //! For a block that is warped too far for the canonical operators: its own [`warped_symmetry`],
-//! [`warped_bounce`], [`warped_prior`] and [`warped`] transport, and the [`warp_error`] to decide by.
+//! [`warped_bounce`], [`warped_prior`] and [`warped`] transport, and the [`warp_error`] to decide by. What it
+//! does at probes ([`warped_outputs`]) and through openings ([`warped_openings`]) joins them in [`variants`].
 
 pub mod config;
 pub mod progress;
@@ -33,6 +34,10 @@ pub mod warped_prior;
 mod snapshots;
 pub mod warped;
 pub mod warp_error;
+pub mod warped_outputs;
+pub mod warped_openings;
+pub mod variants;
+pub mod warp_advice;
 pub mod tube_bounce;
 pub mod tube_prior;
 pub mod tube_lightfield;

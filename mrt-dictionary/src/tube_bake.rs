@@ -7,7 +7,7 @@
 
 use crate::config::BakeConfig;
 use crate::interface::{LightfieldBasis, exchanged, lightfield_basis, lightfield_coefficients};
-use crate::joint::{Arriving, JointBasis, OwnLight, joint_of};
+use crate::joint::{ForeignLight, JointBasis, OwnLight, joint_basis_of};
 use crate::lightfield::LightfieldGrid;
 use crate::progress::{Cancelled, Progress};
 use crate::transport::BlockTransport;
@@ -150,7 +150,7 @@ fn pack_tube(
         for lightfields in [&basis.vectors, turned] {
             progress.check()?;
             let response = tube_wall_response(grid, lightfields, form, opening, resolution);
-            arriving.push(Arriving {
+            arriving.push(ForeignLight {
                 field: weights.weigh(&response),
                 vector: Matrix::zeros(0, response.columns()),
             });
@@ -171,7 +171,7 @@ fn pack_tube(
         vector,
         joint_from_response,
         dropped_energy,
-    } = joint_of(&own, arriving, &classes, &basis.scales, extra, 2);
+    } = joint_basis_of(&own, arriving, &basis.scales, &classes, extra, 2);
     let openings = form
         .openings()
         .iter()

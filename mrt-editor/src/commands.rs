@@ -1,6 +1,7 @@
 //! One module a command: its flags and what it does.
 
 pub mod accuracy;
+pub mod adapt;
 pub mod bake;
 pub mod demo;
 pub mod info;

@@ -107,9 +107,16 @@ fn parse(bytes: &[u8], place: String) -> Result<Dictionary, SourceError> {
 /// # Errors
 /// [`Cancelled`].
 pub fn bake_with_progress(config: &BakeConfig) -> Result<Dictionary, Cancelled> {
+    with_progress(&format!("baking {}", config.preset), |progress| {
+        bake(config, progress)
+    })
+}
+
+/// Runs long work with progress on standard error; an interrupt (Ctrl-C) asks it to stop.
+pub fn with_progress<T>(name: &str, work: impl FnOnce(&Progress) -> T) -> T {
     let terminal = std::io::stderr().is_terminal();
     let report = |what: &str, step: usize, steps: usize| {
-        let line = format!("baking {}: step {step} of {steps}, {what}", config.preset);
+        let line = format!("{name}: step {step} of {steps}, {what}");
         // On a terminal one line is rewritten; in a log every step keeps its own.
         if terminal {
             eprint!("\r\x1b[K{line}");
@@ -119,7 +126,7 @@ pub fn bake_with_progress(config: &BakeConfig) -> Result<Dictionary, Cancelled> 
             eprintln!("{line}");
         }
     };
-    let result = bake(config, &Progress::new(&report, interrupted()));
+    let result = work(&Progress::new(&report, interrupted()));
     if terminal {
         eprintln!();
     }

@@ -4,6 +4,7 @@
 pub mod commands;
 pub mod dictionary_source;
 pub mod import;
+pub mod level_file;
 pub mod level_view;
 pub mod map;
 pub mod output;

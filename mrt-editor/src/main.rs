@@ -1,7 +1,7 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::commands::{accuracy, bake, demo, info, light, map, pack};
+use mrt_editor::commands::{accuracy, adapt, bake, demo, info, light, map, pack};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
@@ -19,6 +19,7 @@ struct Cli {
 enum Command {
     Demo(demo::DemoArgs),
     Bake(bake::BakeArgs),
+    Adapt(adapt::AdaptArgs),
     Info(info::InfoArgs),
     Accuracy(accuracy::AccuracyArgs),
     Map(map::MapArgs),
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match command {
         Command::Demo(args) => demo::run(&args).map_err(Into::into),
         Command::Bake(args) => bake::run(&args).map_err(Into::into),
+        Command::Adapt(args) => adapt::run(&args).map_err(Into::into),
         Command::Info(args) => info::run(&args).map_err(Into::into),
         Command::Accuracy(args) => accuracy::run(&args).map_err(Into::into),
         Command::Map(args) => map::run(&args).map_err(Into::into),

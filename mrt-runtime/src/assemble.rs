@@ -1,7 +1,8 @@
 //! Joins a level and a dictionary into a scene (Loos et al. 2011, sections 6.2 and 6.3).
 
 use crate::atlas::AtlasLayout;
-use crate::dictionary::{Dictionary, OperatorMatrix};
+use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators, WarpTransport};
+use crate::form::form_of;
 use crate::level::{Level, LevelError, Opening, corner_index};
 use crate::path::hole_of;
 use crate::propagate;
@@ -85,6 +86,19 @@ pub enum AssembleError {
          without --coupling table)"
     )]
     MissingLightfields,
+    /// A block wants operators for its warp that nobody has made.
+    #[error(
+        "block {block}: the dictionary has no {transport} operators for its shape `{shape}` in this form; run \
+         `mrt adapt` on the level, or set its transport to \"canonical\""
+    )]
+    MissingVariant {
+        /// Which block.
+        block: usize,
+        /// Its shape.
+        shape: &'static str,
+        /// [`WarpTransport::name`] of what it wants.
+        transport: &'static str,
+    },
     /// More openings than paths are followed through.
     #[error("light may cross {found} openings; expected at most {MAX_DEPTH}")]
     Depth {
@@ -140,12 +154,12 @@ pub fn assemble(
             found: config.max_depth,
         });
     }
-    let used = used_shapes(level, dictionary)?;
+    let (used, operators_of_block) = used_operators(level, dictionary)?;
     let config = &AssembleConfig {
         coupling: usable_coupling(level, dictionary, config.coupling)?,
         ..config.clone()
     };
-    let blocks = place_blocks(level, dictionary, &used)?;
+    let blocks = place_blocks(level, dictionary, &used, &operators_of_block)?;
     let resolution = dictionary.resolution;
     let texel_bytes = BYTES_PER_TEXEL * blocks.last().map_or(0, |b| b.texels.end);
     let operator_bytes =
@@ -160,7 +174,7 @@ pub fn assemble(
         resolution,
         shapes: used
             .iter()
-            .map(|&index| scene_shape(dictionary, index))
+            .map(|&entry| scene_shape(entry, resolution))
             .collect(),
         texel_positions: Vec::new(),
         texel_normals: Vec::new(),
@@ -198,12 +212,13 @@ pub(crate) fn usable_coupling<M>(
     Ok(Coupling::Lightfield)
 }
 
-/// Dictionary positions of the shapes that the level uses, in dictionary order.
-pub(crate) fn used_shapes<M>(
+/// The operators that the level uses, each once, and for each block which of them.
+pub(crate) fn used_operators<'a, M>(
     level: &Level,
-    dictionary: &Dictionary<M>,
-) -> Result<Vec<usize>, AssembleError> {
-    let mut used = vec![false; dictionary.shapes.len()];
+    dictionary: &'a Dictionary<M>,
+) -> Result<(Vec<&'a ShapeOperators<M>>, Vec<usize>), AssembleError> {
+    let mut used: Vec<&ShapeOperators<M>> = Vec::new();
+    let mut of_block = Vec::with_capacity(level.blocks.len());
     for (index, block) in level.blocks.iter().enumerate() {
         let position =
             dictionary
@@ -218,26 +233,40 @@ pub(crate) fn used_shapes<M>(
                         .collect::<Vec<_>>()
                         .join(", "),
                 })?;
-        used[position] = true;
+        let entry = match block.transport {
+            WarpTransport::Canonical => &dictionary.shapes[position],
+            transport => {
+                let variant = dictionary.variant(block.shape, transport, &form_of(block));
+                let missing = || AssembleError::MissingVariant {
+                    block: index,
+                    shape: block.shape.name,
+                    transport: transport.name(),
+                };
+                &variant.ok_or_else(missing)?.operators
+            }
+        };
+        let known = used.iter().position(|&other| std::ptr::eq(other, entry));
+        of_block.push(known.unwrap_or_else(|| {
+            used.push(entry);
+            used.len() - 1
+        }));
     }
-    Ok((0..used.len()).filter(|&k| used[k]).collect())
+    Ok((used, of_block))
 }
 
 pub(crate) fn place_blocks(
     level: &Level,
     dictionary: &Dictionary<impl OperatorMatrix>,
-    used: &[usize],
+    used: &[&ShapeOperators<impl OperatorMatrix>],
+    operators_of_block: &[usize],
 ) -> Result<Vec<SceneBlock>, AssembleError> {
     let neighbours = level.neighbours();
     let doors = level.door_of_openings();
     let mut blocks = Vec::with_capacity(level.blocks.len());
     let (mut texel, mut coefficient, mut joint) = (0, 0, 0);
     for (index, block) in level.blocks.iter().enumerate() {
-        let shape_index = used
-            .iter()
-            .position(|&k| dictionary.shapes[k].shape == block.shape)
-            .unwrap_or(0);
-        let entry = &dictionary.shapes[used[shape_index]];
+        let shape_index = operators_of_block[index];
+        let entry = used[shape_index];
         let (modes, joint_modes) = (entry.modes(), entry.joint_modes());
         let texels = block.shape.texel_count(dictionary.resolution);
         let mut beyond = [Beyond::Wall; 6];
@@ -389,13 +418,12 @@ fn place_texels(scene: &mut Scene, level: &Level) {
     }
 }
 
-fn scene_shape(dictionary: &Dictionary<impl OperatorMatrix>, index: usize) -> SceneShape {
-    let entry = &dictionary.shapes[index];
+fn scene_shape(entry: &ShapeOperators<impl OperatorMatrix>, resolution: usize) -> SceneShape {
     SceneShape {
         coefficients_from_direct: entry.coefficients_from_direct.decode().into_owned(),
         joint_basis: entry.joint_basis.decode().into_owned(),
         probe_basis: entry.probe_basis.decode().into_owned(),
         vector_basis: entry.vector_basis.decode().into_owned(),
-        texel_areas: entry.shape.relative_texel_areas(dictionary.resolution),
+        texel_areas: entry.shape.relative_texel_areas(resolution),
     }
 }

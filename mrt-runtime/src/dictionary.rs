@@ -8,6 +8,7 @@ mod operator;
 
 pub use operator::{OperatorKind, OperatorMatrix};
 
+use crate::form::{Form, same_form};
 use crate::path::Word;
 use crate::shape::Shape;
 use mrt_core::cube::Face;
@@ -45,9 +46,11 @@ pub struct Dictionary<M = Matrix<f32>> {
 pub struct Variant<M = Matrix<f32>> {
     /// How they were made.
     pub transport: WarpTransport,
-    /// Corners of the warp from the canonical cube, less the first corner, over the length of the diagonal of their
-    /// bounds: blocks of the same form share a variant wherever they stand and however large they are.
-    pub corners: [[f32; 3]; 8],
+    /// Corners of the warp from the canonical cube, turned back by the block's orientation, less the first corner,
+    /// over the length of the diagonal of their bounds ([`form_of`](crate::form::form_of)): blocks of the same form
+    /// share a variant wherever they stand, however large they are and whichever way they are turned. Probes have
+    /// their axes: those of the canonical cube, whatever the warp does.
+    pub corners: Form,
     /// The operators; emission and response modes are those of the dictionary.
     pub operators: ShapeOperators<M>,
 }
@@ -62,6 +65,29 @@ pub enum WarpTransport {
     Regathered,
     /// Everything computed for the warped shape.
     Rebuilt,
+}
+
+impl WarpTransport {
+    /// From the cheapest to the best.
+    pub const ALL: [WarpTransport; 3] = [
+        WarpTransport::Canonical,
+        WarpTransport::Regathered,
+        WarpTransport::Rebuilt,
+    ];
+
+    /// "canonical", "regathered" or "rebuilt".
+    pub fn name(self) -> &'static str {
+        match self {
+            WarpTransport::Canonical => "canonical",
+            WarpTransport::Regathered => "regathered",
+            WarpTransport::Rebuilt => "rebuilt",
+        }
+    }
+
+    /// Inverse of [`WarpTransport::name`].
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|level| level.name() == name)
+    }
 }
 
 /// Operators of one shape; "texels" counts those of the shape's walls ([`Shape::texels`]).
@@ -171,6 +197,20 @@ impl<M> Dictionary<M> {
     /// Position in [`Dictionary::shapes`] of a shape, if it is there.
     pub fn shape_index(&self, shape: &Shape) -> Option<usize> {
         self.shapes.iter().position(|entry| entry.shape == shape)
+    }
+
+    /// The variant for a block of a shape and form, if it is there.
+    pub fn variant(
+        &self,
+        shape: &Shape,
+        transport: WarpTransport,
+        form: &Form,
+    ) -> Option<&Variant<M>> {
+        self.variants.iter().find(|variant| {
+            variant.transport == transport
+                && variant.operators.shape == shape
+                && same_form(&variant.corners, form)
+        })
     }
 
     /// Number of response modes.

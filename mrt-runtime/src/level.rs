@@ -1,5 +1,6 @@
 //! What a designer edits: warped blocks and the openings through which they are joined.
 
+use crate::dictionary::WarpTransport;
 use crate::light::MAX_LIGHT_VALUE;
 use crate::shape::{Aperture, Outline, Shape};
 use glam::{DVec3, Vec3};
@@ -54,6 +55,8 @@ pub struct Block {
     pub albedo: [Vec3; 6],
     /// Radiosity that each face emits of itself, linear RGB, W/m², in the order of [`Face::ALL`].
     pub emission: [Vec3; 6],
+    /// Whose operators it uses: the canonical shape's, or those that were made for its warp.
+    pub transport: WarpTransport,
 }
 
 /// One end of a connection: a face of a block's turned cube.
@@ -255,6 +258,7 @@ impl Block {
             warp,
             albedo: [albedo; 6],
             emission: [Vec3::ZERO; 6],
+            transport: WarpTransport::Canonical,
         }
     }
 

@@ -18,8 +18,10 @@
 //! albedo = [0.7, 0.7, 0.7]
 //! face_albedo = { "-y" = [0.4, 0.2, 0.1] }
 //! face_emission = { "+y" = [3.0, 3.0, 2.5] }   # W/m², a panel that is lit
+//! transport = "regathered"     # or "rebuilt": operators made for this warp by `mrt adapt`
 //! ```
 
+use crate::dictionary::WarpTransport;
 use crate::level::{Block, Connection, Door, Level, LevelError, MAX_BLOCKS, Opening};
 use crate::shape::{SHAPES, Shape};
 use glam::{DVec3, Vec3};
@@ -90,6 +92,17 @@ pub enum LevelTextError {
         /// How many were given.
         found: usize,
     },
+    /// Not a way to transport light in a warped block.
+    #[error(
+        "block {block}: transport `{found}`; expected one of {}",
+        WarpTransport::ALL.map(WarpTransport::name).join(", ")
+    )]
+    UnknownTransport {
+        /// Which block.
+        block: usize,
+        /// The text given.
+        found: String,
+    },
     /// Not a face.
     #[error("{place}: face `{found}`; expected -x, +x, -y, +y, -z or +z")]
     UnknownFace {
@@ -141,6 +154,8 @@ struct BlockText {
     face_albedo: BTreeMap<String, [f32; 3]>,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     face_emission: BTreeMap<String, [f32; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    transport: Option<String>,
 }
 
 /// Reads and checks a level.
@@ -253,6 +268,13 @@ fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
         let face = read_face(name, || format!("block {index}"))?;
         block.emission[face.index()] = Vec3::from_array(*emission);
     }
+    if let Some(name) = &text.transport {
+        block.transport =
+            WarpTransport::from_name(name).ok_or_else(|| LevelTextError::UnknownTransport {
+                block: index,
+                found: name.clone(),
+            })?;
+    }
     Ok(block)
 }
 
@@ -325,6 +347,8 @@ fn write_block(block: &Block) -> BlockText {
                 (face.name().to_owned(), emission)
             })
             .collect(),
+        transport: (block.transport != WarpTransport::Canonical)
+            .then(|| block.transport.name().to_owned()),
     }
 }
 
@@ -341,6 +365,8 @@ mod tests {
             connection: 1,
             value: 0.3,
         });
+        level.blocks[1].transport = WarpTransport::Regathered;
+        level.blocks[2].transport = WarpTransport::Rebuilt;
         level.blocks[2].warp.corners[7] += DVec3::new(0.1, 0.2, 1.0 / 3.0);
         level
     }
@@ -375,6 +401,11 @@ mod tests {
             fault("orientation = \"+z+y\"", "orientation = \"+z-z\""),
             LevelTextError::UnknownOrientation { .. }
         ));
+        assert!(matches!(
+            fault("\"rebuilt\"", "\"perfect\""),
+            LevelTextError::UnknownTransport { block: 2, .. }
+        ));
+        assert!(!good.contains("canonical"));
         assert!(matches!(
             fault("\"+x\"", "\"up\""),
             LevelTextError::UnknownFace { .. }

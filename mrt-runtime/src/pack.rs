@@ -1,7 +1,7 @@
 //! Leaves out of a dictionary what a level does not use, so that a game ships no more.
 
-use crate::assemble::{AssembleError, Coupling, place_blocks, usable_coupling, used_shapes};
-use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix};
+use crate::assemble::{AssembleError, Coupling, place_blocks, usable_coupling, used_operators};
+use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
 use crate::level::Level;
 use crate::propagate::used_paths;
 
@@ -43,21 +43,23 @@ pub fn pack<M: OperatorMatrix>(
     config: &PackConfig,
 ) -> Result<Dictionary<M>, AssembleError> {
     level.check()?;
-    let used = used_shapes(level, dictionary)?;
-    let blocks = place_blocks(level, dictionary, &used)?;
+    let (used, operators_of_block) = used_operators(level, dictionary)?;
+    let blocks = place_blocks(level, dictionary, &used, &operators_of_block)?;
     let needs_lightfields =
         usable_coupling(level, dictionary, Coupling::Table)? == Coupling::Lightfield;
     let used_paths = used_paths(&blocks, &dictionary.paths)?;
     // Everything but the matrices is small, so leaving out is simpler than choosing.
     let mut packed = dictionary.clone();
-    packed.shapes = used
-        .iter()
-        .map(|&index| dictionary.shapes[index].clone())
-        .collect();
-    let kept = |name: &str| packed.shapes.iter().any(|entry| entry.shape.name == name);
     packed
+        .shapes
+        .retain(|entry| level.blocks.iter().any(|block| block.shape == entry.shape));
+    let is_used = |entry: &ShapeOperators<M>| used.iter().any(|&other| std::ptr::eq(other, entry));
+    packed.variants = dictionary
         .variants
-        .retain(|variant| kept(variant.operators.shape.name));
+        .iter()
+        .filter(|variant| is_used(&variant.operators))
+        .cloned()
+        .collect();
     let mut used_paths = used_paths.into_iter();
     packed
         .paths

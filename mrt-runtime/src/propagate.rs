@@ -9,11 +9,12 @@
 
 mod lightfield;
 mod table;
+mod transit;
 
 pub(crate) use table::used_paths;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
-use crate::dictionary::{Dictionary, OperatorMatrix};
+use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators};
 use crate::path::{Roll, hole_of};
 use crate::scene::{Gate, Scene, Transport};
 use crate::shape::Aperture;
@@ -23,6 +24,7 @@ use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, multiply_add};
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use transit::Transits;
 
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
@@ -43,14 +45,15 @@ struct ArrivalKey {
 }
 
 /// Assembles the operator from all blocks' coefficients b to all blocks' joint coefficients.
-pub(crate) fn joint_from_coefficients(
+pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     scene: &Scene,
-    dictionary: &Dictionary<impl OperatorMatrix>,
-    used_shapes: &[usize],
+    dictionary: &Dictionary<M>,
+    used_shapes: &[&ShapeOperators<M>],
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
-    let mut table = table::Table::new(scene, dictionary, used_shapes, config.max_depth);
+    let transits = Transits::new(scene, dictionary, used_shapes);
+    let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
     let covered = match config.coupling {
         Coupling::Table => dictionary.paths.depths(),
         Coupling::Lightfield => [0; 3],
@@ -76,7 +79,7 @@ pub(crate) fn joint_from_coefficients(
                 scene,
                 dictionary,
                 fields,
-                used_shapes,
+                (used_shapes, &transits),
                 source,
                 depth,
                 covered,
@@ -85,7 +88,7 @@ pub(crate) fn joint_from_coefficients(
                 add(&mut arrivals, key, responses);
             }
         }
-        for (doors, block, joint) in project(scene, dictionary, used_shapes, arrivals) {
+        for (doors, block, joint) in project(scene, used_shapes, arrivals) {
             bytes += std::mem::size_of_val(joint.data());
             if bytes > max_bytes {
                 return Err(AssembleError::TooLarge {
@@ -129,14 +132,13 @@ fn add(arrivals: &mut Arrivals, key: ArrivalKey, responses: Matrix<f32>) {
 /// Projects responses on the joint bases, and sums those of one block behind the same doors.
 fn project(
     scene: &Scene,
-    dictionary: &Dictionary<impl OperatorMatrix>,
-    used_shapes: &[usize],
+    used_shapes: &[&ShapeOperators<impl OperatorMatrix>],
     arrivals: Arrivals,
 ) -> Vec<(Vec<u32>, usize, Matrix<f32>)> {
     let mut sums: Vec<(Vec<u32>, usize, Matrix<f32>)> = Vec::new();
     for (key, responses) in arrivals {
         let placed = &scene.blocks[key.block];
-        let entry = &dictionary.shapes[used_shapes[placed.shape_index]];
+        let entry = used_shapes[placed.shape_index];
         let opening = placed
             .shape
             .openings
@@ -164,14 +166,14 @@ fn project(
     sums
 }
 
-/// Adds responses, brought to the frame without mirrors, to those that enter at the same place.
+/// Adds responses times a factor, brought to the frame without mirrors, to those that enter at the same place.
 fn arrive(
     arrivals: &mut Arrivals,
     doors: &[u32],
     (block, face): (usize, Face),
     target_frame: CubeSymmetry,
     parity: &[u8],
-    responses: &Matrix<f32>,
+    (responses, factor): (&Matrix<f32>, f32),
 ) {
     let roll = Roll::of(target_frame);
     let key = ArrivalKey {
@@ -190,7 +192,7 @@ fn arrive(
         .zip(responses.data().chunks_exact(rows))
     {
         for ((to, &from), &parity) in to.iter_mut().zip(from).zip(parity) {
-            *to += roll.sign(parity) * from;
+            *to += factor * roll.sign(parity) * from;
         }
     }
 }

@@ -10,6 +10,7 @@ pub use error::LightCommandError;
 
 use crate::dictionary_source::load;
 use crate::import::read_scene;
+use crate::level_file::read_level;
 use crate::map::paint::coverage;
 use crate::map::surface::spread_points;
 use crate::output::is_same_place;
@@ -24,15 +25,15 @@ use crate::receiver::ReceiverMap;
 use glam::{DVec3, Vec3};
 use mrt_core::bvh::Bvh;
 use mrt_core::mesh::corner_normals;
+use mrt_dictionary::warp_error::guessed_error;
 use mrt_runtime::assemble::{AssembleConfig, assemble};
+use mrt_runtime::dictionary::WarpTransport;
 use mrt_runtime::frame::{Bounces, Frame, FrameError};
 use mrt_runtime::level::Level;
-use mrt_runtime::level_text::{MAX_TEXT_BYTES, from_text};
 use mrt_runtime::light::Light;
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::{Openings, Rays};
 use report::{Report, light_row};
-use std::io::Read;
 use std::path::Path;
 use std::time::Instant;
 
@@ -69,6 +70,9 @@ const COVERAGE_POINTS: usize = 4096;
 /// and more.
 const LEAST_COVERAGE: f64 = 0.1;
 
+/// Expected error of a canonical block above which the user is told.
+const WARP_WARNING: f64 = 0.1;
+
 /// Pictures of one camera.
 struct View {
     name: String,
@@ -98,6 +102,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     let imported = read_scene(&args.scene, &args.import.config())?;
     let mesh = &imported.mesh;
     let level = read_level(&args.level)?;
+    warn_of_warps(&level);
     let bvh = Bvh::build(mesh);
     let surroundings = Surroundings::new(mesh, &bvh, &level);
     let receivers = ReceiverMap::with_mesh(&level, &bvh);
@@ -163,23 +168,25 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     Ok(())
 }
 
-fn read_level(path: &Path) -> Result<Level, LightCommandError> {
-    let io = |source| LightCommandError::LevelFile {
-        path: path.to_owned(),
-        source,
-    };
-    let mut bytes = Vec::new();
-    std::fs::File::open(path)
-        .map_err(io)?
-        // One byte more than a level may have tells too long from just fitting.
-        .take(MAX_TEXT_BYTES as u64 + 1)
-        .read_to_end(&mut bytes)
-        .map_err(io)?;
-    let text = String::from_utf8_lossy(&bytes);
-    from_text(&text).map_err(|source| LightCommandError::Level {
-        path: path.to_owned(),
-        source,
-    })
+/// Says which blocks are warped too far for the operators that they use.
+fn warn_of_warps(level: &Level) {
+    let guesses = level
+        .blocks
+        .iter()
+        .enumerate()
+        .filter(|(_, block)| block.transport == WarpTransport::Canonical)
+        .map(|(index, block)| (index, guessed_error(&block.warp)))
+        .filter(|&(_, error)| error > WARP_WARNING);
+    let count = guesses.clone().count();
+    if let Some((worst, error)) = guesses.max_by(|a, b| a.1.total_cmp(&b.1)) {
+        eprintln!(
+            "mrt: warning: {count} of {} blocks are warped so far that their light errs by over {:.0} %, \
+             block {worst} by about {:.0} %; `mrt adapt` gives them operators of their own",
+            level.blocks.len(),
+            100.0 * WARP_WARNING,
+            100.0 * error
+        );
+    }
 }
 
 /// The lights asked for, or a few in the largest blocks.

@@ -3,8 +3,9 @@
 //! Sequences that reach an opening with the same set of headings behind them are summed before they go on, since
 //! open rooms have binomially many.
 
+use super::transit::Transits;
 use super::{Arrivals, arrive, compose, with_door};
-use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix};
+use crate::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
 use crate::path::{Roll, frame_of_heading, hole_of};
 use crate::scene::{Beyond, Scene};
 use mrt_core::cube::{CubeRotation, Face};
@@ -41,17 +42,17 @@ type Front = BTreeMap<WaveKey, Wave>;
 
 /// The sum of all light of a block that enters others, but for paths of up to `covered` openings, which is by the
 /// number of holes on the way (two standing for more); `fields` are the dictionary's, decoded.
-pub(super) fn follow(
+pub(super) fn follow<M: OperatorMatrix>(
     scene: &Scene,
-    dictionary: &Dictionary<impl OperatorMatrix>,
+    dictionary: &Dictionary<M>,
     fields: &LightfieldOperators,
-    used_shapes: &[usize],
+    (used_shapes, transits): (&[&ShapeOperators<M>], &Transits),
     source: usize,
     max_depth: usize,
     covered: [usize; 3],
 ) -> Arrivals {
     let block = &scene.blocks[source];
-    let emission = &dictionary.shapes[used_shapes[block.shape_index]].openings;
+    let emission = &used_shapes[block.shape_index].openings;
     let mut front = Front::new();
     for (aperture, operators) in block.shape.openings.iter().zip(emission) {
         let sent = Sent {
@@ -86,7 +87,7 @@ pub(super) fn follow(
                     (key.block, key.entered),
                     target_frame,
                     &dictionary.paths.response_parity,
-                    &responses,
+                    (&responses, 1.0),
                 );
             }
             if depth == max_depth {
@@ -100,7 +101,11 @@ pub(super) fn follow(
                 if turns_back || !leads_on || aperture.face == key.entered {
                     continue;
                 }
-                let (frame, lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+                let (frame, mut lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+                let factor = transits.factor(here, key.entered, aperture.face);
+                if factor != 1.0 {
+                    lightfield.data_mut().iter_mut().for_each(|x| *x *= factor);
+                }
                 let sent = Sent {
                     block: key.block,
                     exit: aperture.face,

@@ -4,9 +4,10 @@
 //! binomially many, which bounds the depth of a table rather than that of a level: adding one costs the additions
 //! of one small matrix.
 
+use super::transit::Transits;
 use super::{Arrivals, arrive, compose, with_door};
 use crate::assemble::AssembleError;
-use crate::dictionary::{Dictionary, OperatorMatrix, PathTable};
+use crate::dictionary::{Dictionary, OperatorMatrix, PathTable, ShapeOperators};
 use crate::path::{Crossing, MAX_WORD, Roll, Word, frame_of_heading, hole_of, response_frame};
 use crate::scene::{Beyond, Scene, SceneBlock};
 use mrt_core::cube::{CubeRotation, Face};
@@ -19,7 +20,8 @@ use std::rc::Rc;
 pub(super) struct Table<'a, M> {
     scene: &'a Scene,
     dictionary: &'a Dictionary<M>,
-    used_shapes: &'a [usize],
+    used_shapes: &'a [&'a ShapeOperators<M>],
+    transits: &'a Transits,
     max_depth: usize,
     /// Responses from coefficients.
     cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
@@ -29,6 +31,7 @@ pub(super) struct Table<'a, M> {
 type CacheKey = (usize, usize, usize, bool, u8);
 
 /// A path up to the block that it has just entered.
+#[derive(Clone)]
 struct Path {
     word: Word,
     block: usize,
@@ -40,12 +43,16 @@ struct Path {
     x: Option<Face>,
     y: Option<Face>,
     doors: Vec<u32>,
+    /// Product of the transits so far.
+    factor: f32,
 }
 
 /// All paths from a block whose words are in a table.
 struct Walk<'a, M> {
     blocks: &'a [SceneBlock],
     paths: &'a PathTable<M>,
+    /// What warped blocks do to light on its way; `None` where only the words matter.
+    transits: Option<&'a Transits>,
     max_depth: usize,
     source: usize,
     /// Position in the source shape's openings of the first one crossed.
@@ -71,6 +78,7 @@ impl<M> Walk<'_, M> {
             x: None,
             y: None,
             doors: Vec::new(),
+            factor: 1.0,
         };
         self.cross(self.first(), &start, visit)
     }
@@ -133,6 +141,7 @@ impl<M> Walk<'_, M> {
             x,
             y,
             doors: with_door(&path.doors, here.doors[exit.index()]),
+            factor: path.factor,
         };
         visit(index, &next);
         if next.word.crossings().len() >= self.max_depth {
@@ -142,7 +151,15 @@ impl<M> Walk<'_, M> {
             let heading = next.source_from_here.face(aperture.face);
             let used = [Some(first), next.x, next.y];
             if !used.contains(&Some(heading.opposite())) {
-                self.cross(aperture.face, &next, visit)?;
+                let there = &self.blocks[block];
+                let transit = self
+                    .transits
+                    .map_or(1.0, |t| t.factor(there, entered, aperture.face));
+                let onward = Path {
+                    factor: next.factor * transit,
+                    ..next.clone()
+                };
+                self.cross(aperture.face, &onward, visit)?;
             }
         }
         Ok(())
@@ -160,6 +177,7 @@ pub(crate) fn used_paths<M>(
             let walk = Walk {
                 blocks,
                 paths,
+                transits: None,
                 max_depth: MAX_WORD,
                 source,
                 opening,
@@ -174,13 +192,15 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     pub(super) fn new(
         scene: &'a Scene,
         dictionary: &'a Dictionary<M>,
-        used_shapes: &'a [usize],
+        used_shapes: &'a [&'a ShapeOperators<M>],
+        transits: &'a Transits,
         max_depth: usize,
     ) -> Self {
         Self {
             scene,
             dictionary,
             used_shapes,
+            transits,
             max_depth,
             cache: HashMap::new(),
         }
@@ -194,6 +214,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
             let walk = Walk {
                 blocks: &self.scene.blocks,
                 paths: &self.dictionary.paths,
+                transits: Some(self.transits),
                 max_depth: self.max_depth,
                 source,
                 opening,
@@ -210,7 +231,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
                     (path.block, path.entered),
                     target_frame,
                     &self.dictionary.paths.response_parity,
-                    &responses,
+                    (&responses, path.factor),
                 );
             })?;
         }
@@ -232,7 +253,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
         self.cache
             .entry(key)
             .or_insert_with(|| {
-                let operators = &dictionary.shapes[used].openings[opening];
+                let operators = &used.openings[opening];
                 let exchanged = usize::from(roll.exchanged);
                 // Without vertical openings every frame keeps up, and there is one.
                 let emission = operators

@@ -2,11 +2,11 @@
 
 use crate::dictionary_source::SourceError;
 use crate::import::ImportError;
+use crate::level_file::LevelFileError;
 use crate::picture::file::WriteError;
 use glam::Vec3;
 use mrt_runtime::assemble::AssembleError;
 use mrt_runtime::frame::FrameError;
-use mrt_runtime::level_text::LevelTextError;
 use std::path::PathBuf;
 
 /// Why there are no pictures.
@@ -37,22 +37,9 @@ pub enum LightCommandError {
     /// The mesh cannot be read.
     #[error(transparent)]
     Import(#[from] ImportError),
-    /// The level's file cannot be read.
-    #[error("level {}: {source}", path.display())]
-    LevelFile {
-        /// Which file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The level is faulty.
-    #[error("level {}: {source}", path.display())]
-    Level {
-        /// Which file.
-        path: PathBuf,
-        /// What is wrong.
-        source: LevelTextError,
-    },
+    /// The level's file is at fault.
+    #[error(transparent)]
+    Level(#[from] LevelFileError),
     /// There is no dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
