@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod bake;
 pub mod demo;
+pub mod figures;
 pub mod info;
 pub mod light;
 pub mod map;

@@ -1,7 +1,7 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::commands::{accuracy, bake, demo, info, light, map};
+use mrt_editor::commands::{accuracy, bake, demo, figures, info, light, map};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
@@ -23,6 +23,7 @@ enum Command {
     Accuracy(accuracy::AccuracyArgs),
     Map(map::MapArgs),
     Light(light::LightArgs),
+    Figures(figures::FiguresArgs),
 }
 
 fn main() -> ExitCode {
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
         Command::Accuracy(args) => accuracy::run(&args).map_err(Into::into),
         Command::Map(args) => map::run(&args).map_err(Into::into),
         Command::Light(args) => light::run(&args).map_err(Into::into),
+        Command::Figures(args) => figures::run(&args).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
