@@ -41,7 +41,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     }
     let rows = (MODES / MODES_A_ROW) as i32;
     let width = LEFT + MODES_A_ROW as i32 * (NET[0] + GAP) + 10;
-    let mut canvas = Canvas::new(width as usize, (TOP + rows * ROW + 44) as usize);
+    let mut canvas = Canvas::new(width as usize, (TOP + rows * ROW + 16) as usize);
     canvas.text(
         [20, 22],
         Side::Right,
@@ -58,15 +58,16 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         [20, 60],
         Side::Right,
         Lettering::Remark,
-        "of such patterns; a frame computes their weights, one number each.",
+        "of such patterns; a frame computes their weights, one number each. Numbers: strength relative to mode 2.",
     );
-    let first = entry.singular_values[0];
+    // Enrichment makes the first mode, uniform light, as strong as it likes: the second is the measure.
+    let measure = entry.singular_values.get(1).copied().unwrap_or(1.0);
     for mode in 0..MODES.min(entry.modes()) {
         let (row, column) = ((mode / MODES_A_ROW) as i32, (mode % MODES_A_ROW) as i32);
         let [x, y] = [LEFT + column * (NET[0] + GAP), TOP + row * ROW];
-        let label = match entry.singular_values[mode] / first {
-            _ if mode == 0 => "mode 1".to_owned(),
-            ratio => format!("mode {}: strength {ratio:.2}", mode + 1),
+        let label = match entry.singular_values[mode] / measure {
+            _ if mode == 0 => "mode 1 (even light)".to_owned(),
+            strength => format!("mode {}: {strength:.2}", mode + 1),
         };
         canvas.text([x, y], Side::Right, Lettering::Heading, &label);
         let resolution = dictionary.resolution;
@@ -86,7 +87,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             }
         }
     }
-    draw_key(&mut canvas, [LEFT, TOP + rows * ROW + 16]);
+    draw_key(&mut canvas, [LEFT, TOP + rows * ROW - 8]);
     Ok(canvas)
 }
 

@@ -1,4 +1,4 @@
-//! A part of the demo's maze with a sphere at each probe of one layer, lit by the probe alone.
+//! The demo's maze with a sphere at each probe of one layer, lit by the probe alone.
 
 use super::canvas::{Canvas, Lettering, Side};
 use super::{FigureError, Setting};
@@ -19,8 +19,8 @@ use std::f32::consts::PI;
 
 const BOUNCES: u32 = 8;
 /// Metres; blocks are cubes of 1 m.
-const SPHERE_RADIUS: f32 = 0.055;
-const SPHERE_ALBEDO: f32 = 0.9;
+const SPHERE_RADIUS: f32 = 0.06;
+const SPHERE_ALBEDO: f32 = 0.75;
 /// Over the floor, of a block's height: at most this.
 const LAYER: f64 = 0.5;
 const PICTURE: [usize; 2] = [860, 470];
@@ -38,7 +38,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         vector: false,
     };
     let mut frame = Frame::with_outputs(&scene, outputs);
-    // A warm lamp at the end of the red arm and a cool one in the blue arm.
+    // A warm lamp in the red arm, a cool one in the blue arm, a weak one in the far corner.
     let lamp = |position, intensity| Light::Sphere {
         position,
         radius: 0.1,
@@ -47,6 +47,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let lights = [
         lamp(Vec3::new(0.55, 0.62, 0.5), Vec3::new(1.0, 0.82, 0.6)),
         lamp(Vec3::new(0.6, 0.62, 2.5), Vec3::new(0.6, 0.78, 1.0)),
+        lamp(Vec3::new(4.5, 0.62, 3.5), Vec3::splat(0.5)),
     ];
     frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
     let spheres =
@@ -73,9 +74,9 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     );
     let aspect = PICTURE[0] as f32 / PICTURE[1] as f32;
     let camera = Camera::look_at(
-        Vec3::new(1.6, 4.6, 4.4),
-        Vec3::new(1.62, 0.2, 1.62),
-        0.62,
+        Vec3::new(2.5, 6.4, 6.6),
+        Vec3::new(2.5, 0.2, 1.95),
+        0.58,
         aspect,
     );
     let Some(camera) = camera else {

@@ -1,6 +1,6 @@
 //! How fast singular values fall (the paper's table 2, and what else is cut off).
 
-use super::canvas::{Area, Canvas, Lettering, PAPER, SERIES, Side};
+use super::canvas::{Area, Canvas, Colour, Lettering, PAPER, SERIES, Side};
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::{FigureError, Setting};
 use mrt_core::matrix::Matrix;
@@ -29,7 +29,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     if let Some(spectrum) = emission(setting) {
         series.push(("light that leaves by an opening".to_owned(), spectrum));
     }
-    let mut canvas = Canvas::new(900, 590);
+    let mut canvas = Canvas::new(900, 706);
     canvas.text(
         [20, 22],
         Side::Right,
@@ -50,7 +50,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             .zip(values)
             .map(|(k, value)| [f64::from(k), value / values[0]])
             .collect();
-        plot.draw_series(&mut canvas, &points, stroke(colour, 0.0));
+        plot.draw_series(&mut canvas, &points, stroke(colour));
         for (share, radius) in SHARES.into_iter().zip([4.0, 5.5, 7.0]) {
             let rank = spectrum.energy_rank(share).max(1);
             if points[rank - 1][1] >= FLOOR {
@@ -65,38 +65,25 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         .zip(SERIES)
         .map(|((name, spectrum), colour)| {
             let [a, b, c] = SHARES.map(|share| spectrum.energy_rank(share));
-            (stroke(colour, 0.0), format!("{name}: {a} / {b} / {c}"))
+            (stroke(colour), format!("{name}: {a} / {b} / {c}"))
         })
         .collect();
-    let height = 20 * entries.len() as i32 + 26;
-    let corner = [
-        plot.area.x + 16,
-        plot.area.y + plot.area.height - height - 10,
-    ];
-    canvas.fill(
-        Area {
-            x: corner[0] - 8,
-            y: corner[1] - 6,
-            width: 470,
-            height: height + 6,
-        },
-        PAPER,
-    );
+    let below = plot.area.y + plot.area.height + 62;
     canvas.text(
-        [corner[0], corner[1] + 6],
+        [plot.area.x, below],
         Side::Right,
         Lettering::Remark,
-        "modes that hold 80 / 90 / 95 % of the energy (rings)",
+        "modes that hold 80 / 90 / 95 % of the energy (small, middle, large ring):",
     );
-    draw_legend(&mut canvas, [corner[0], corner[1] + 28], &entries);
+    draw_legend(&mut canvas, [plot.area.x, below + 22], &entries);
     Ok(canvas)
 }
 
-fn stroke(colour: super::canvas::Colour, mark: f32) -> Stroke {
+fn stroke(colour: Colour) -> Stroke {
     Stroke {
         colour,
         is_dashed: false,
-        mark,
+        mark: 0.0,
     }
 }
 

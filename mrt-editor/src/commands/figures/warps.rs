@@ -33,13 +33,13 @@ const HALL_LIGHT: DVec3 = DVec3::new(0.4, 0.55, 0.1);
 const HALL_ALBEDO: [f64; 3] = [0.6; 3];
 const HALL_BOUNCES: usize = 20;
 
-const STRIP: [usize; 2] = [800, 190];
+const STRIP: [usize; 2] = [800, 200];
 
 pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let cube = ClosedCube::new(setting.resolution)?;
     let top = 430;
-    let step = STRIP[1] as i32 + 34;
-    let mut canvas = Canvas::new(900, (top + 64 + 4 * step) as usize);
+    let step = STRIP[1] as i32 + 32;
+    let mut canvas = Canvas::new(900, (top + 42 + 4 * step) as usize);
     canvas.text(
         [20, 22],
         Side::Right,
@@ -201,12 +201,15 @@ fn draw_hall(
     for ([t, u], name) in hall.levels.iter().zip(LEVELS) {
         let found = reduced([t, u], direct.column(0), &albedo, HALL_BOUNCES);
         let error = relative(&hall.walls.areas, &flat(&found), &flat(&truth));
-        strips.push((format!("{name}: error {:.0} %", 100.0 * error), found));
+        strips.push((
+            format!("{name}: relative L2 error {:.0} %", 100.0 * error),
+            found,
+        ));
     }
     // From the side, the long wall x = 0 left out; the lit end is on the left.
     let middle = (0.5 * HALL).as_vec3();
     let aspect = STRIP[0] as f32 / STRIP[1] as f32;
-    let camera = Camera::look_at(middle - Vec3::X * 4.2, middle, 0.305, aspect);
+    let camera = Camera::look_at(middle - Vec3::X * 4.2, middle, 0.27, aspect);
     let Some(camera) = camera else {
         return Ok(());
     };

@@ -13,10 +13,12 @@ use mrt_tests::exact::{ExactScene, Side as Beyond};
 
 const RED: [f64; 3] = [0.6, 0.05, 0.05];
 const WHITE: [f64; 3] = [0.8; 3];
-const WHITE_FACE: Face = Face::NegX;
+const WHITE_FACE: Face = Face::NegZ;
 const LAMP: DVec3 = DVec3::new(0.55, 0.5, 0.4);
 const BOUNCES: usize = 10;
 const PANEL: usize = 280;
+/// Auto exposure goes by luminance, of which red has little, and would leave red without shades.
+const EXPOSURE: f32 = 0.5;
 
 pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let resolution = setting.resolution;
@@ -51,7 +53,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let (left, top, step) = (20, 96, PANEL as i32 + 16);
     let mut canvas = Canvas::new(
         3 * (PANEL + 16) + 24,
-        (top + 2 * (PANEL as i32 + 42) + 44) as usize,
+        (top + 2 * (PANEL as i32 + 42) - 22) as usize,
     );
     canvas.text(
         [left, 22],
@@ -82,10 +84,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let Some(camera) = camera else {
         return Ok(canvas);
     };
-    for (row, name) in ["direct and indirect light", "indirect light only"]
-        .into_iter()
-        .enumerate()
-    {
+    for row in 0..2 {
         let y = top + row as i32 * (PANEL as i32 + 42);
         let pictures = columns.map(|(_, indirect)| {
             let irradiance: Vec<[f64; 3]> = indirect
@@ -102,14 +101,15 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             };
             room.picture(&camera, [PANEL; 2])
         });
-        let exposure = auto_exposure(&[&pictures[0][0]]);
+        let exposure = EXPOSURE * auto_exposure(&[&pictures[0][0]]);
         for (column, ([picture, shown], (label, signal))) in
             pictures.iter().zip(columns).enumerate()
         {
             let x = left + column as i32 * step;
             let text = match (row, column) {
+                (0, 0) => "exact: direct and indirect light".to_owned(),
                 (0, _) => label.to_owned(),
-                (_, 0) => name.to_owned(),
+                (_, 0) => "exact: indirect light only".to_owned(),
                 _ => {
                     let [all, wall] = errors(signal, &truth, resolution);
                     format!("error {all:.1} %, white wall {wall:.1} %")
