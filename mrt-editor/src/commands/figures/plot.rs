@@ -1,6 +1,6 @@
 //! Plots: axes with units, lines through points, a legend.
 
-use super::canvas::{Area, Canvas, Colour, INK, Lettering, RULE, Side};
+use super::canvas::{Area, Canvas, Colour, INK, Lettering, PAPER, RULE, Side};
 
 /// How values become places along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,6 +58,8 @@ pub struct Plot {
     pub y: Axis,
 }
 
+/// Pixels of a letter.
+const LETTER: i32 = 8;
 const LINE_WIDTH: f32 = 2.0;
 /// Pixels of a dash and of the gap after it.
 const DASH: [f32; 2] = [7.0, 5.0];
@@ -205,6 +207,17 @@ fn draw_line(canvas: &mut Canvas, pixels: &[[f32; 2]], stroke: Stroke) {
 pub fn draw_legend(canvas: &mut Canvas, [x, y]: [i32; 2], entries: &[(Stroke, String)]) {
     for (k, (stroke, name)) in entries.iter().enumerate() {
         let y = y + 20 * k as i32;
+        // Names stand on the page, not on the grid.
+        let width = 40 + LETTER * name.chars().count() as i32;
+        canvas.fill(
+            Area {
+                x: x - 4,
+                y: y - 10,
+                width,
+                height: 20,
+            },
+            PAPER,
+        );
         let [left, right] = [[x as f32, y as f32], [(x + 26) as f32, y as f32]];
         draw_line(canvas, &[left, right], *stroke);
         if stroke.mark > 0.0 {

@@ -19,7 +19,7 @@ use std::f32::consts::PI;
 
 const BOUNCES: u32 = 8;
 /// Metres; blocks are cubes of 1 m.
-const SPHERE_RADIUS: f32 = 0.06;
+const SPHERE_RADIUS: f32 = 0.07;
 const SPHERE_ALBEDO: f32 = 0.75;
 /// Over the floor, of a block's height: at most this.
 const LAYER: f64 = 0.5;
@@ -75,8 +75,8 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let aspect = PICTURE[0] as f32 / PICTURE[1] as f32;
     let camera = Camera::look_at(
         Vec3::new(2.5, 6.4, 6.6),
-        Vec3::new(2.5, 0.2, 1.95),
-        0.58,
+        Vec3::new(2.5, 0.2, 1.93),
+        0.51,
         aspect,
     );
     let Some(camera) = camera else {

@@ -20,7 +20,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         .map(|spectrum| {
             let name = match spectrum.matrix {
                 "L_d" => "L_d, light of lamps anywhere".to_owned(),
-                "M" => "M = F P S, what such light becomes".to_owned(),
+                "M" => "M = F P S (64 vectors), what that light becomes".to_owned(),
                 name => format!("{name}, one bounce"),
             };
             (name, spectrum)
