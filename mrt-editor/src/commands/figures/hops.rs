@@ -25,6 +25,9 @@ const REFERENCES: [&str; 6] = [
 /// description says: noise of the files and the texel grid, least and most of any file.
 const REFERENCE_ERROR: [[f64; 2]; HOP_GROUPS] = [[0.1, 0.3], [0.1, 0.4], [0.2, 1.3], [0.6, 3.2]];
 
+/// Where the legend begins.
+const LEGEND: i32 = 566;
+
 const BAND: Colour = [238, 238, 240];
 
 pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
@@ -37,7 +40,8 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     for preset in setting.presets {
         dictionaries.push(Cow::Owned(load(None, Some(preset))?));
     }
-    let mut canvas = Canvas::new(900, 560);
+    let series = 2 * dictionaries.len();
+    let mut canvas = Canvas::new(900, LEGEND as usize + 20 * series + 34);
     let heading = |canvas: &mut Canvas, y, lettering, text: &str| {
         canvas.text([20, y], Side::Right, lettering, text);
     };
@@ -60,12 +64,6 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         .collect();
     plot.draw_band(&mut canvas, &band, BAND);
     plot.draw_axes(&mut canvas);
-    canvas.text(
-        [plot.area.x + 40, plot.area.y + plot.area.height - 46],
-        Side::Right,
-        Lettering::Remark,
-        "grey: what the references themselves are good to",
-    );
     let mut legend = Vec::new();
     for (dictionary, colour) in dictionaries.iter().zip(SERIES) {
         for (coupling, name) in [
@@ -83,7 +81,8 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
                 mark: 4.0,
             };
             plot.draw_series(&mut canvas, &points, stroke);
-            for &point in &points {
+            // Numbers of several dictionaries would stand on each other.
+            for &point in points.iter().filter(|_| dictionaries.len() == 1) {
                 let [x, y] = plot.pixel(point).map(|k| k as i32);
                 // The better coupling's numbers stand below its line, the other's above.
                 let offset = if stroke.is_dashed { -14 } else { 15 };
@@ -96,13 +95,23 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
                     &text,
                 );
             }
+            let numbers = by_hop.map(|error| format!("{error:.1}")).join(" / ");
             legend.push((
                 stroke,
-                format!("{}: {name} (whole level {whole:.1} %)", dictionary.preset),
+                format!(
+                    "{}, {name}: {numbers}, whole level {whole:.1}",
+                    dictionary.preset
+                ),
             ));
         }
     }
-    draw_legend(&mut canvas, [plot.area.x + 40, plot.area.y + 18], &legend);
+    heading(
+        &mut canvas,
+        LEGEND,
+        Lettering::Remark,
+        "Errors in %, by distance. Grey: what the references themselves are good to.",
+    );
+    draw_legend(&mut canvas, [20, LEGEND + 24], &legend);
     Ok(canvas)
 }
 
@@ -168,10 +177,8 @@ fn plot() -> Plot {
         y: Axis {
             label: "relative L2 error of irradiance",
             scale: Scale::Logarithmic,
-            range: [0.2, 60.0],
-            ticks: [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0]
-                .map(percent)
-                .into(),
+            range: [0.2, 30.0],
+            ticks: [0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0].map(percent).into(),
         },
     }
 }

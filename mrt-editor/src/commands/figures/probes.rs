@@ -23,7 +23,7 @@ const SPHERE_RADIUS: f32 = 0.07;
 const SPHERE_ALBEDO: f32 = 0.75;
 /// Over the floor, of a block's height: at most this.
 const LAYER: f64 = 0.5;
-const PICTURE: [usize; 2] = [860, 470];
+const PICTURE: [usize; 2] = [820, 448];
 
 struct Sphere {
     center: Vec3,

@@ -85,7 +85,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         return Ok(canvas);
     };
     for row in 0..2 {
-        let y = top + row as i32 * (PANEL as i32 + 42);
+        let y = top + row * (PANEL as i32 + 42);
         let pictures = columns.map(|(_, indirect)| {
             let irradiance: Vec<[f64; 3]> = indirect
                 .iter()
