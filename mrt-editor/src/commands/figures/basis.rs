@@ -41,24 +41,13 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     }
     let rows = (MODES / MODES_A_ROW) as i32;
     let width = LEFT + MODES_A_ROW as i32 * (NET[0] + GAP) + 10;
-    let mut canvas = Canvas::new(width as usize, (TOP + rows * ROW + 16) as usize);
-    canvas.text(
-        [20, 22],
-        Side::Right,
-        Lettering::Title,
+    let mut canvas = Canvas::titled(
+        [width, TOP + rows * ROW + 16],
         "The first modes of a closed cube, unfolded",
-    );
-    canvas.text(
-        [20, 44],
-        Side::Right,
-        Lettering::Remark,
-        "Lights on the walls (above) and the indirect light that they make (below). A block's indirect light is a sum",
-    );
-    canvas.text(
-        [20, 60],
-        Side::Right,
-        Lettering::Remark,
-        "of such patterns; a frame computes their weights, one number each. Numbers: strength relative to mode 2.",
+        &[
+            "Lights on the walls (above) and the indirect light that they make (below). A block's indirect light is a sum",
+            "of such patterns; a frame computes their weights, one number each. Numbers: strength relative to mode 2.",
+        ],
     );
     // Enrichment makes the first mode, uniform light, as strong as it likes: the second is the measure.
     let measure = entry.singular_values.get(1).copied().unwrap_or(1.0);

@@ -114,6 +114,17 @@ impl Canvas {
         }
     }
 
+    /// A page with a title and lines of remarks: the first at y = 44, the others 16 pixels apart.
+    pub fn titled(size: [i32; 2], title: &str, remarks: &[&str]) -> Self {
+        let [width, height] = size.map(|k| k.max(0) as usize);
+        let mut page = Self::new(width, height);
+        page.text([20, 22], Side::Right, Lettering::Title, title);
+        for (k, remark) in (0i32..).zip(remarks) {
+            page.text([20, 44 + 16 * k], Side::Right, Lettering::Remark, remark);
+        }
+        page
+    }
+
     /// Pixels across and down.
     pub fn size(&self) -> [usize; 2] {
         [self.width, self.height]

@@ -40,22 +40,11 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     for preset in setting.presets {
         dictionaries.push(Cow::Owned(load(None, Some(preset))?));
     }
-    let series = 2 * dictionaries.len();
-    let mut canvas = Canvas::new(900, LEGEND as usize + 20 * series + 34);
-    let heading = |canvas: &mut Canvas, y, lettering, text: &str| {
-        canvas.text([20, y], Side::Right, lettering, text);
-    };
-    heading(
-        &mut canvas,
-        22,
-        Lettering::Title,
+    let series = 2 * dictionaries.len() as i32;
+    let mut canvas = Canvas::titled(
+        [900, LEGEND + 20 * series + 34],
         "Error of indirect light by distance from the lamp",
-    );
-    heading(
-        &mut canvas,
-        44,
-        Lettering::Remark,
-        "First bounce, against path-traced references of six levels; mean over all lamps.",
+        &["First bounce, against path-traced references of six levels; mean over all lamps."],
     );
     let plot = plot();
     let band: Vec<[f64; 3]> = (0u32..)
@@ -105,9 +94,9 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             ));
         }
     }
-    heading(
-        &mut canvas,
-        LEGEND,
+    canvas.text(
+        [20, LEGEND],
+        Side::Right,
         Lettering::Remark,
         "Errors in %, by distance. Grey: what the references themselves are good to.",
     );

@@ -1,6 +1,6 @@
 //! The demo's maze with a sphere at each probe of one layer, lit by the probe alone.
 
-use super::canvas::{Canvas, Lettering, Side};
+use super::canvas::Canvas;
 use super::{FigureError, Setting};
 use crate::commands::demo::MAZE;
 use crate::level_view::LevelView;
@@ -53,24 +53,14 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let spheres =
         spheres(&scene, &frame).ok_or(FigureError::NotInDictionary { missing: "probes" })?;
     let shown = LevelView::new(&scene, &frame, &lights, false)?;
-    let mut canvas = Canvas::new(PICTURE[0] + 40, PICTURE[1] + 100);
-    canvas.text(
-        [20, 22],
-        Side::Right,
-        Lettering::Title,
+    let [width, height] = PICTURE.map(|k| k as i32);
+    let mut canvas = Canvas::titled(
+        [width + 40, height + 100],
         "Probes in the demo's maze, shown as white spheres",
-    );
-    canvas.text(
-        [20, 44],
-        Side::Right,
-        Lettering::Remark,
-        "Indirect light only, seen from above without ceilings. Each sphere shows what its probe would light a white thing",
-    );
-    canvas.text(
-        [20, 60],
-        Side::Right,
-        Lettering::Remark,
-        "with: colours come from the walls around it, and from blocks beyond the openings.",
+        &[
+            "Indirect light only, seen from above without ceilings. Each sphere shows what its probe would light a white thing",
+            "with: colours come from the walls around it, and from blocks beyond the openings.",
+        ],
     );
     let aspect = PICTURE[0] as f32 / PICTURE[1] as f32;
     let camera = Camera::look_at(

@@ -29,18 +29,12 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     if let Some(spectrum) = emission(setting) {
         series.push(("light that leaves by an opening".to_owned(), spectrum));
     }
-    let mut canvas = Canvas::new(900, 706);
-    canvas.text(
-        [20, 22],
-        Side::Right,
-        Lettering::Title,
+    let mut canvas = Canvas::titled(
+        [900, 706],
         "How many modes light needs: singular values of a cube's light transport",
-    );
-    canvas.text(
-        [20, 44],
-        Side::Right,
-        Lettering::Remark,
-        "One bounce of any light (F) needs hundreds of modes; one bounce of light that lamps make (M) needs a handful.",
+        &[
+            "One bounce of any light (F) needs hundreds of modes; one bounce of light that lamps make (M) needs a handful.",
+        ],
     );
     let plot = plot();
     plot.draw_axes(&mut canvas);

@@ -39,12 +39,12 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let cube = ClosedCube::new(setting.resolution)?;
     let top = 430;
     let step = STRIP[1] as i32 + 32;
-    let mut canvas = Canvas::new(900, (top + 42 + 4 * step) as usize);
-    canvas.text(
-        [20, 22],
-        Side::Right,
-        Lettering::Title,
+    let mut canvas = Canvas::titled(
+        [900, top + 42 + 4 * step],
         "Blocks that are not cubes",
+        &[
+            "First bounce in closed boxes of 1:1:a, against closed-form transport between their texels; median of 40 lamps.",
+        ],
     );
     draw_errors(&mut canvas, setting, &cube);
     canvas.text(
@@ -126,12 +126,6 @@ fn relative(areas: &[f64], found: &[f64], truth: &[f64]) -> f64 {
 }
 
 fn draw_errors(canvas: &mut Canvas, setting: &Setting, cube: &ClosedCube) {
-    canvas.text(
-        [20, 44],
-        Side::Right,
-        Lettering::Remark,
-        "First bounce in closed boxes of 1:1:a, against closed-form transport between their texels; median of 40 lamps.",
-    );
     let tick = |value: f64, name: String| (value, name);
     let plot = Plot {
         area: Area {

@@ -50,30 +50,17 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         ("with enrichment", &found[0]),
         ("without enrichment", &found[1]),
     ];
-    let (left, top, step) = (20, 96, PANEL as i32 + 16);
-    let mut canvas = Canvas::new(
-        3 * (PANEL + 16) + 24,
-        (top + 2 * (PANEL as i32 + 42) - 22) as usize,
-    );
-    canvas.text(
-        [left, 22],
-        Side::Right,
-        Lettering::Title,
+    let panel = PANEL as i32;
+    let (left, top, step) = (20, 96, [panel + 16, panel + 42]);
+    let mut canvas = Canvas::titled(
+        [3 * step[0] + 24, top + 2 * step[1] - 22],
         "A red box with one white wall, under a white lamp",
-    );
-    canvas.text(
-        [left, 44],
-        Side::Right,
-        Lettering::Remark,
-        &format!(
-            "{BOUNCES} bounces; {MODES} modes, which do not know colours: they have to tell light from one wall from that of"
-        ),
-    );
-    canvas.text(
-        [left, 60],
-        Side::Right,
-        Lettering::Remark,
-        "the next. Enrichment adds such light to what the modes are chosen for (the paper's appendix A).",
+        &[
+            &format!(
+                "{BOUNCES} bounces; {MODES} modes, which do not know colours: they have to tell light from one wall from that of"
+            ),
+            "the next. Enrichment adds such light to what the modes are chosen for (the paper's appendix A).",
+        ],
     );
     let camera = Camera::look_at(
         Vec3::new(0.5, 0.5, 2.38),
@@ -85,7 +72,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         return Ok(canvas);
     };
     for row in 0..2 {
-        let y = top + row * (PANEL as i32 + 42);
+        let y = top + row * step[1];
         let pictures = columns.map(|(_, indirect)| {
             let irradiance: Vec<[f64; 3]> = indirect
                 .iter()
@@ -105,7 +92,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         for (column, ([picture, shown], (label, signal))) in
             pictures.iter().zip(columns).enumerate()
         {
-            let x = left + column as i32 * step;
+            let x = left + column as i32 * step[0];
             let text = match (row, column) {
                 (0, 0) => "exact: direct and indirect light".to_owned(),
                 (0, _) => label.to_owned(),
