@@ -4,6 +4,7 @@ pub mod accuracy;
 pub mod adapt;
 pub mod bake;
 pub mod demo;
+pub mod figures;
 pub mod info;
 pub mod light;
 pub mod map;

@@ -47,6 +47,16 @@ struct Patch {
     corners: [[f32; 2]; 3],
 }
 
+/// A point of a wall that a ray meets from inside.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    patch: Patch,
+    u: f32,
+    v: f32,
+    normal: DVec3,
+    distance: f32,
+}
+
 impl<'a> LevelView<'a> {
     /// A view of a solved scene; without ceilings (+y walls as the level names them) it can be seen from
     /// above.
@@ -108,11 +118,22 @@ impl<'a> LevelView<'a> {
 
     /// Radiance towards the ray's origin, W/(m² sr) per channel, from direct and from indirect light;
     /// `None` where the ray meets no wall from inside.
-    pub fn radiance(&self, mut origin: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
+    pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
+        let seen = self.seen(origin, direction)?;
+        Some(self.leaving(&seen))
+    }
+
+    /// How far the ray goes until it meets a wall from inside, in lengths of its direction.
+    pub fn distance(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        self.seen(origin, direction).map(|seen| seen.distance)
+    }
+
+    fn seen(&self, mut origin: Vec3, direction: Vec3) -> Option<Seen> {
+        let mut start = 0.0;
         // A ray crosses each block at most twice.
         for _ in 0..2 * self.scene.blocks.len() + 2 {
             let hit = self.bvh.closest_hit(origin, direction, f32::MAX)?;
-            let patch = &self.triangles[hit.triangle as usize];
+            let patch = self.triangles[hit.triangle as usize];
             let [a, b, c] = patch.corners;
             let mix = |k: usize| a[k] + hit.u * (b[k] - a[k]) + hit.v * (c[k] - a[k]);
             let (u, v) = (mix(0), mix(1));
@@ -122,14 +143,28 @@ impl<'a> LevelView<'a> {
                 .wall_point(patch.face, f64::from(u), f64::from(v));
             let normal = wall.warped_normal(&block.warp);
             if normal.dot(direction.as_dvec3()) < 0.0 {
-                return Some(self.leaving(patch, u, v, normal));
+                return Some(Seen {
+                    patch,
+                    u,
+                    v,
+                    normal,
+                    distance: start + hit.t,
+                });
             }
             origin += direction * (hit.t + RESTART);
+            start += hit.t + RESTART;
         }
         None
     }
 
-    fn leaving(&self, patch: &Patch, u: f32, v: f32, normal: DVec3) -> (Vec3, Vec3) {
+    fn leaving(&self, seen: &Seen) -> (Vec3, Vec3) {
+        let Seen {
+            patch,
+            u,
+            v,
+            normal,
+            ..
+        } = *seen;
         let block = &self.scene.blocks[patch.block];
         let (across, up) = (f64::from(u), f64::from(v));
         let wall = block.shape.wall_point(patch.face, across, up);

@@ -1,7 +1,7 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::commands::{accuracy, adapt, bake, demo, info, light, map, pack};
+use mrt_editor::commands::{accuracy, adapt, bake, demo, figures, info, light, map, pack};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
@@ -25,6 +25,7 @@ enum Command {
     Map(map::MapArgs),
     Light(light::LightArgs),
     Pack(pack::PackArgs),
+    Figures(figures::FiguresArgs),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +41,7 @@ fn main() -> ExitCode {
         Command::Map(args) => map::run(&args).map_err(Into::into),
         Command::Light(args) => light::run(&args).map_err(Into::into),
         Command::Pack(args) => pack::run(&args).map_err(Into::into),
+        Command::Figures(args) => figures::run(&args).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
