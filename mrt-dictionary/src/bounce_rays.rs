@@ -27,6 +27,9 @@ pub fn ray_traced_bounce(shape: &Shape, resolution: usize, rays: u32) -> Matrix<
         .enumerate()
         .map(|(index, &(face, point))| {
             let mut row = vec![0.0; texels.len()];
+            if shape.is_in_hole(face, point) {
+                return row;
+            }
             let normal = -face.outward();
             let start = (point + normal * RAY_OFFSET).as_vec3();
             for ray in 0..rays {
@@ -38,8 +41,9 @@ pub fn ray_traced_bounce(shape: &Shape, resolution: usize, rays: u32) -> Matrix<
                 };
                 let wall = walls[hit.triangle as usize / 2];
                 let at = (start + direction * hit.t).as_dvec3();
+                // What meets a hole leaves.
                 let offset = shape.wall_offset(wall, resolution);
-                if let Some(offset) = offset {
+                if let Some(offset) = offset.filter(|_| !shape.is_in_hole(wall, at)) {
                     row[offset + wall.texel_index(at, resolution)] += 1.0;
                 }
             }

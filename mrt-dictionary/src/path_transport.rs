@@ -314,11 +314,6 @@ mod tests {
             probes: 1,
             vector: false,
         };
-        let straight = gather(
-            &Word::from_name("zz").expect("word"),
-            Signals::Given(&unit_radiosity(4)),
-            &setup,
-        );
         let turned = gather(
             &Word::from_name("zx").expect("word"),
             Signals::Given(&unit_radiosity(4)),
@@ -326,7 +321,6 @@ mod tests {
         );
         let total = |m: &Matrix<f64>| m.data().iter().sum::<f64>();
         assert!(total(&turned.irradiance) > 0.0);
-        assert!(total(&turned.irradiance) < total(&straight.irradiance));
         // Two openings that share an edge show a line of the first from points in line with it, and no more.
         let around = gather(
             &Word::from_name("zzx").expect("word"),
@@ -352,5 +346,6 @@ mod tests {
             &setup,
         );
         assert!(total(&door.irradiance) < 0.5 * total(&whole.irradiance));
+        assert!(total(&turned.irradiance) < 0.5 * total(&whole.irradiance));
     }
 }

@@ -24,7 +24,7 @@ use mrt_runtime::dictionary::{
 };
 use mrt_runtime::form::{Form, form_of, same_form, warp_of};
 use mrt_runtime::level::Level;
-use mrt_runtime::shape::Outline;
+use mrt_runtime::shape::{Outline, Shape};
 
 /// What making variants is free to choose.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +59,17 @@ pub enum VariantError {
     /// The dictionary lacks a shape.
     #[error("block {block}: the dictionary has no shape `{shape}`")]
     MissingShape {
+        /// Which block.
+        block: usize,
+        /// Its shape.
+        shape: &'static str,
+    },
+    /// A shape with a hole is to be rebuilt.
+    #[error(
+        "block {block}: shape `{shape}` has a hole in a wall and cannot be rebuilt for its warp; expected transport \
+         \"regathered\" or \"canonical\""
+    )]
+    Hole {
         /// Which block.
         block: usize,
         /// Its shape.
@@ -135,6 +146,12 @@ fn wanted<'a>(
                 block: index,
                 shape: block.shape.name,
             })?;
+        if block.transport == WarpTransport::Rebuilt && has_hole(block.shape) {
+            return Err(VariantError::Hole {
+                block: index,
+                shape: block.shape.name,
+            });
+        }
         let form = form_of(block);
         let is_known = wanted.iter().any(|(entry, other, transport)| {
             entry.shape == block.shape && *transport == block.transport && same_form(other, &form)
@@ -144,6 +161,12 @@ fn wanted<'a>(
         }
     }
     Ok(wanted)
+}
+
+/// True for doors and windows: the symmetries of their walls, which a rebuild decomposes by, are not theirs.
+pub fn has_hole(shape: &Shape) -> bool {
+    let mut openings = shape.openings.iter();
+    openings.any(|opening| matches!(opening.outline, Outline::Hole(_)))
 }
 
 /// The response basis as a bake has it. Its scales are not in the file; they follow from what shapes emit and what

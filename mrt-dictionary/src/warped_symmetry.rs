@@ -140,7 +140,7 @@ pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
 mod tests {
     use super::*;
     use crate::symmetry::texel_parity_classes;
-    use mrt_runtime::shape::cubes;
+    use mrt_runtime::shape::{Outline, Shape, cubes};
 
     fn class_count(corner: impl Fn(DVec3) -> DVec3) -> usize {
         let warp = Hexahedron {
@@ -180,7 +180,9 @@ mod tests {
 
     #[test]
     fn unwarped_shapes_have_the_classes_of_the_dictionary() {
-        for shape in cubes() {
+        // Walls do not know of holes, which is why shapes with one are not rebuilt.
+        let has_hole = |shape: &&Shape| shape.openings.iter().any(|o| o.outline != Outline::Whole);
+        for shape in cubes().filter(|shape| !has_hole(shape) && shape.wall_count() > 0) {
             let faces: Vec<Face> = shape.walls().collect();
             let walls = WarpedWalls::new(&faces, 4, &Hexahedron::cell(DVec3::ZERO));
             assert_eq!(

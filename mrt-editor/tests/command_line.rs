@@ -326,7 +326,6 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
     let flat = ["--set".into(), "cubes-2d".into(), "--json".into()];
     for (name, subject) in [
         ("stack3.json", "stack3"),
-        ("cube_probes.json", "cube_probes"),
         ("no-such-file.json", "no-such-file.json"),
     ] {
         let arguments = [&["accuracy".into(), file(name)], &flat[..]].concat();
@@ -346,12 +345,13 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
         "{}",
         text(&stack.stderr)
     );
-    let probes = mrt(&folder, &["accuracy".into(), file("cube_probes.json")]);
-    assert!(
-        text(&probes.stderr).contains("radiance_sh9"),
-        "{}",
-        text(&probes.stderr)
-    );
+    // Probes are compared with the built-in dictionary's, and its 32 modes err by under a tenth.
+    let probes = ["accuracy".into(), file("cube_probes.json"), "--json".into()];
+    for line in text(&mrt(&folder, &probes).stdout).lines() {
+        let line: Value = serde_json::from_str(line).expect("a JSON object a line");
+        let error = line["rel_l2"].as_f64().expect("a number");
+        assert!(error > 0.0 && error < 0.12, "{line}");
+    }
     // The sound one is compared all the same.
     let both = ["accuracy".into(), file("stack3.json"), file("cube.json")];
     let output = mrt(&folder, &[&both, &flat[..]].concat());

@@ -264,7 +264,8 @@ const BOUNDS: [[f64; 5]; 8] = [
     // Eight texels along a hall of four are coarse; `great_hall.rs` has it at sixteen.
     [0.40, 0.17, 0.085, 0.17, 0.085],
     [0.47, 0.036, 0.013, 0.08, 0.022],
-    [0.45, 0.175, 0.125, 0.18, 0.20],
+    // With modes chosen for probes too, the cube behind reads 20.0 % re-gathered where it read 17.7.
+    [0.45, 0.175, 0.125, 0.21, 0.20],
     [0.25, 0.028, 0.021, 0.125, 0.125],
     [0.155, 0.014, 0.014, 0.17, 0.172],
     [0.12, 0.066, 0.064, 0.09, 0.09],
@@ -413,6 +414,7 @@ fn advice_is_canonical_for_cubes_and_rebuilt_for_long_halls() {
     let advice = |k: usize| estimates[k].advice(&Thresholds::default());
     assert_eq!(advice(0), WarpTransport::Canonical);
     assert_eq!(advice(1), WarpTransport::Rebuilt);
-    assert_eq!(estimates[0].added(WarpTransport::Canonical), 0.0);
+    // F of the cube is computed twice, with and without the general warp: rounding to single precision.
+    assert!(estimates[0].added(WarpTransport::Canonical) < 1e-6);
     assert!((estimates[1].stretch - 6.0).abs() < 1e-12);
 }

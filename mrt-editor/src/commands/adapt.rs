@@ -5,7 +5,7 @@ use crate::level_file::{LevelFileError, read_level, write_level};
 use crate::output::is_same_place;
 use crate::table::Table;
 use mrt_core::container::{ContainerError, write_file_atomically};
-use mrt_dictionary::variants::{VariantConfig, VariantError, make_variants};
+use mrt_dictionary::variants::{VariantConfig, VariantError, has_hole, make_variants};
 use mrt_dictionary::warp_advice::{BlockEstimate, Thresholds, estimate_blocks};
 use mrt_runtime::dictionary::{Dictionary, Variant, WarpTransport};
 use mrt_runtime::dictionary_file::DictionaryError;
@@ -204,6 +204,9 @@ fn adapted(level: &Level, estimates: &[BlockEstimate], args: &AdaptArgs) -> Leve
             Target::Regathered => WarpTransport::Regathered,
             Target::Rebuilt => WarpTransport::Rebuilt,
         };
+        if has_hole(block.shape) && block.transport == WarpTransport::Rebuilt {
+            block.transport = WarpTransport::Regathered;
+        }
     }
     level
 }

