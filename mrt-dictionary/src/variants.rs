@@ -64,6 +64,14 @@ pub enum VariantError {
         /// Its shape.
         shape: &'static str,
     },
+    /// A round tube has canonical operators only.
+    #[error("block {block}: shape `{shape}` is round; expected transport \"canonical\"")]
+    Tube {
+        /// Which block.
+        block: usize,
+        /// Its shape.
+        shape: &'static str,
+    },
     /// A shape with a hole is to be rebuilt.
     #[error(
         "block {block}: shape `{shape}` has a hole in a wall and cannot be rebuilt for its warp; expected transport \
@@ -104,7 +112,8 @@ pub fn make_variants(
     let steps = wanted.len();
     let mut variants = Vec::with_capacity(steps);
     for (step, (canonical, form, transport)) in wanted.into_iter().enumerate() {
-        if canonical.implicit_lighting.columns() != canonical.modes() {
+        let texels = canonical.shape.texel_count(dictionary.resolution);
+        if canonical.implicit_lighting.rows() != texels {
             return Err(VariantError::NoSources {
                 found: "implicit lighting",
             });
@@ -146,6 +155,12 @@ fn wanted<'a>(
                 block: index,
                 shape: block.shape.name,
             })?;
+        if block.transport != WarpTransport::Canonical && block.shape.tube().is_some() {
+            return Err(VariantError::Tube {
+                block: index,
+                shape: block.shape.name,
+            });
+        }
         if block.transport == WarpTransport::Rebuilt && has_hole(block.shape) {
             return Err(VariantError::Hole {
                 block: index,
@@ -186,7 +201,8 @@ fn response_of(dictionary: &Dictionary, sources: &Sources) -> ResponseBasis {
     {
         for (k, sum) in emitted.iter_mut().enumerate() {
             *sum += (0..sent.columns())
-                .map(|j| f64::from(sent[(k, j)]).powi(2))
+                .map(|j| f64::from(sent[(k, j)]))
+                .map(|x| x * x)
                 .sum::<f64>();
         }
     }

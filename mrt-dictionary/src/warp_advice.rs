@@ -125,7 +125,8 @@ fn measure(
             shape: shape.name,
         })?;
     let entry = &dictionary.shapes[position];
-    if shape.wall_count() == 0 {
+    // Round tubes are measured by nothing yet, and have canonical operators only.
+    if shape.wall_count() == 0 || shape.tube().is_some() {
         return Ok(WarpError {
             reused: 0.0,
             regathered: 0.0,
@@ -133,7 +134,7 @@ fn measure(
             regathered_level: 0.0,
         });
     }
-    if entry.implicit_lighting.columns() != entry.modes() {
+    if entry.implicit_lighting.rows() != shape.texel_count(dictionary.resolution) {
         return Err(VariantError::NoSources {
             found: "implicit lighting",
         });

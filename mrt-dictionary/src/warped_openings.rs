@@ -54,7 +54,8 @@ impl<'a> OpeningView<'a> {
     /// From an opening of a shape whose walls these are.
     pub fn new(shape: &'static Shape, walls: &'a WarpedWalls, aperture: &'static Aperture) -> Self {
         let face = aperture.face;
-        let unit_eye = aperture.corners().into_iter().sum::<DVec3>() / 4.0;
+        let corners = aperture.corners();
+        let unit_eye = corners.iter().copied().sum::<DVec3>() / corners.len() as f64;
         let jacobian = walls.warp.jacobian(unit_eye);
         let (u, v) = (jacobian.col(face.u_axis()), jacobian.col(face.v_axis()));
         let across = u.cross(v);

@@ -8,9 +8,10 @@ use crate::path::hole_of;
 use crate::propagate;
 use crate::scene::{Beyond, Portal, Scene, SceneBlock, SceneShape, Transport};
 use crate::wall::UnitFromWorld;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
+use mrt_core::hexahedron::Hexahedron;
 
 /// Settings of [`assemble`].
 #[derive(Clone, Debug, PartialEq)]
@@ -38,7 +39,7 @@ pub enum Coupling {
 pub const MAX_DEPTH: usize = 64;
 
 /// Bytes that positions, normals, albedo, frame buffers and lightmap take for a texel.
-const BYTES_PER_TEXEL: usize = 3 * 12 + 4 * 12 + 2 * 12;
+const BYTES_PER_TEXEL: usize = 4 * 12 + 4 * 12 + 2 * 12;
 
 impl Default for AssembleConfig {
     /// Eight openings and 2 GiB: of what one-bounce light crosses that many, under 0.1 % arrives.
@@ -118,8 +119,8 @@ pub enum AssembleError {
     /// Two openings meet with their up directions turned or mirrored against each other.
     #[error(
         "face {face} of block {block} meets face {other_face} of block {other} with its up direction \
-         towards {found}; expected +y on both sides (turn one block, or use a dictionary with vertical \
-         openings, such as the set cubes-3d)"
+         towards {found}; expected +y, or -y where neither is a hole (turn one block, or use a dictionary with \
+         vertical openings, such as the set cubes-3d)"
     )]
     RolledInterface {
         /// One block.
@@ -139,7 +140,8 @@ pub enum AssembleError {
 /// [`StoredDictionary`](crate::dictionary::StoredDictionary), what the level uses is decoded; the scene borrows
 /// nothing.
 ///
-/// Cost: a k_rlf x k_rlf x k_b product for each opening that each block's light crosses.
+/// Cost: a k_r x k_e x k_b product for each path of openings that a shape's light takes, and the additions of one such
+/// matrix for each path in the level; by lightfields, a k_rlf x k_rlf x k_b product for each opening crossed.
 ///
 /// # Errors
 /// [`AssembleError`].
@@ -192,9 +194,63 @@ pub fn assemble(
         blocks,
     };
     place_texels(&mut scene, level);
+    for (block, placed) in level.blocks.iter().zip(&scene.blocks) {
+        if block.transport != WarpTransport::Canonical {
+            scene.shapes[placed.shape_index].texel_areas = warped_areas(placed, resolution);
+        }
+    }
     scene.transport =
         propagate::joint_from_coefficients(&scene, dictionary, &used, config, operator_bytes)?;
     Ok(scene)
+}
+
+/// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the
+/// middle, by Newton's iteration for the polar decomposition (Higham 1986).
+fn rotation_of(warp: &Hexahedron) -> DMat3 {
+    let jacobian = warp.jacobian(DVec3::splat(0.5));
+    // Near one in size it converges in a few steps, each of which doubles the digits.
+    let size = jacobian.determinant().cbrt();
+    let mut rotation = jacobian * (1.0 / size);
+    for _ in 0..POLAR_STEPS {
+        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
+    }
+    rotation
+}
+
+/// Steps of the polar decomposition: warps that pass the level's check are stretched by up to 1e6.
+const POLAR_STEPS: usize = 40;
+
+fn rotation_matrix(rotation: CubeRotation) -> DMat3 {
+    let [x, y, z] = DVec3::AXES.map(|axis| rotation.direction(axis));
+    DMat3::from_cols(x, y, z)
+}
+
+/// Areas of a warped block's texels over the mean of its openings' (of all its texels' where it has none), in texels:
+/// light that crosses an opening then counts as much on both sides.
+fn warped_areas(block: &SceneBlock, resolution: usize) -> Vec<f32> {
+    let area = |face: Face, unit: DVec3| {
+        let jacobian = block.warp.jacobian(unit);
+        let (u, v) = (jacobian.col(face.u_axis()), jacobian.col(face.v_axis()));
+        u.cross(v).length()
+    };
+    let areas: Vec<f64> = block
+        .shape
+        .texels(resolution)
+        .map(|(face, unit)| area(face, unit))
+        .collect();
+    let openings: Vec<f64> = block
+        .shape
+        .openings
+        .iter()
+        .map(|opening| area(opening.face, opening.face.point(0.5, 0.5)))
+        .collect();
+    let reference = if openings.is_empty() {
+        &areas
+    } else {
+        &openings
+    };
+    let mean = reference.iter().sum::<f64>() / reference.len().max(1) as f64;
+    areas.iter().map(|area| (area / mean) as f32).collect()
 }
 
 /// The coupling asked for, or lightfields where the dictionary never had a table.
@@ -292,6 +348,11 @@ pub(crate) fn place_blocks(
             orientation: block.orientation,
             portals: portals.map(|opening| Portal::new(&warp, opening)).collect(),
             bounds: warp.bounds(),
+            world_from_probe: match block.transport {
+                WarpTransport::Canonical => rotation_of(&warp),
+                // A variant's probes have the level's axes, turned back by the orientation alone.
+                _ => rotation_matrix(block.orientation),
+            },
             unit_from_world: UnitFromWorld::new(&warp),
             warp,
             beyond,
@@ -366,7 +427,8 @@ fn crossing(
     let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
     let keeps_up = match up {
         Some(Face::PosY) => true,
-        Some(Face::NegY) => !has_hole,
+        // Half a turn is two mirrors; a dictionary of version 1 does not know its modes' parities.
+        Some(Face::NegY) => !has_hole && dictionary.knows_parities(),
         _ => dictionary.has_exchanges() && !has_hole,
     };
     let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == image_of(2));

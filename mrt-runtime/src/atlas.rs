@@ -101,6 +101,10 @@ impl AtlasLayout {
 
     /// Bilinear lookup in an image of this layout at pixel coordinates from [`AtlasLayout::pixel`].
     pub fn sample(&self, image: &[[f32; 3]], pixel: Vec2) -> [f32; 3] {
+        // A level of open blocks alone has no walls.
+        if self.width == 0 || self.height == 0 {
+            return [0.0; 3];
+        }
         let at = (pixel - 0.5).clamp(
             Vec2::ZERO,
             Vec2::new(self.width as f32 - 1.0, self.height as f32 - 1.0),

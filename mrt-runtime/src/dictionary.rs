@@ -108,7 +108,7 @@ pub struct ShapeOperators<M = Matrix<f32>> {
     pub vector_basis: M,
     /// In the order of [`Shape::openings`].
     pub openings: Vec<OpeningOperators<M>>,
-    /// `L_imp`, texels x modes: radiosity whose indirect light `U_b` is; no columns in packed dictionaries.
+    /// `L_imp`, texels x modes: radiosity whose indirect light `U_b` is; no rows in packed dictionaries.
     pub implicit_lighting: M,
     /// Singular values of the modes, largest first.
     pub singular_values: Vec<f32>,
@@ -211,6 +211,14 @@ impl<M> Dictionary<M> {
                 && variant.operators.shape == shape
                 && same_form(&variant.corners, form)
         })
+    }
+
+    /// True when the parities of response modes under both mirrors are known, which version 1 of the format lacks.
+    pub fn knows_parities(&self) -> bool {
+        self.paths
+            .response_parity
+            .iter()
+            .any(|&parity| parity & 2 != 0)
     }
 
     /// Number of response modes.

@@ -64,7 +64,13 @@ pub struct Outputs {
 impl StageTimes {
     /// Sum over the stages.
     pub fn total(&self) -> Duration {
-        self.direct + self.coefficients + self.responses + self.indirect + self.atlas
+        self.direct
+            + self.coefficients
+            + self.responses
+            + self.indirect
+            + self.atlas
+            + self.probes
+            + self.vector
     }
 }
 
@@ -257,6 +263,25 @@ impl Frame {
                 scene.joint_count,
             ),
             ("doors", self.doors.len(), scene.doors.len()),
+            (
+                "blocks with probes",
+                self.probes.as_ref().map_or(0, Probes::block_count),
+                self.probes.as_ref().map_or(0, |_| scene.blocks.len()),
+            ),
+            (
+                "probes along an edge",
+                self.probes.as_ref().map_or(0, Probes::per_axis),
+                self.probes.as_ref().map_or(0, |_| scene.probes),
+            ),
+            (
+                "texels with vector irradiance",
+                self.vector.len() / 12,
+                if self.vector.is_empty() || !scene.has_vector() {
+                    0
+                } else {
+                    scene.texel_count()
+                },
+            ),
             ("lightmap pixels", self.lightmap.len(), pixels),
         ] {
             if found != expected {
@@ -336,7 +361,8 @@ impl Frame {
         self.times.indirect += end - after_responses;
     }
 
-    /// Opens or closes a door: 1 lets everything through, 0 nothing; what does not pass is lost. The next
+    /// Opens or closes a door for direct and indirect light ([`Rays`](crate::visibility::Rays) ask the caller's function
+    /// alone, which must know it): 1 lets everything through, 0 nothing; what does not pass is lost. The next
     /// frame sees it.
     ///
     /// # Errors
@@ -527,8 +553,10 @@ fn limit_flux(
             let areas = &scene.shapes[block.shape_index].texel_areas;
             let texels = block.texels.clone().zip(&direct[range.clone()]);
             let fresh: f64 = texels
-                .zip(areas)
-                .map(|((texel, &e), &area)| {
+                .enumerate()
+                .map(|(k, (texel, &e))| {
+                    // Cubes list no areas: theirs are equal.
+                    let area = areas.get(k).copied().unwrap_or(1.0);
                     let reflected = scene.texel_albedo[texel][channel] * e;
                     f64::from((reflected + scene.texel_emission[texel][channel]) * area)
                 })

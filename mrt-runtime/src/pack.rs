@@ -32,7 +32,8 @@ impl Default for PackConfig {
 
 /// The part of a dictionary that a level uses: its shapes, their variants, and the paths that light takes in it.
 ///
-/// Scenes are the same to the last bit, whatever the depth to which light is followed. Matrices are cloned, which
+/// With lightfields kept, scenes are the same to the last bit, whatever the depth to which light is followed; without,
+/// light ends at the table's longest path. Matrices are cloned, which
 /// copies those that are not borrowed.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 //!
 //! A straight ray through a grid of cubes never uses two opposite headings. So after turning and mirroring, its
 //! first heading is +z, the first one that differs +x, and the third one +y: a path is a word over z, x and y. A
-//! dictionary stores one operator a word (DESIGN: path table), and a level finds the word and the symmetry that
+//! dictionary stores one operator a word, and a level finds the word and the symmetry that
 //! leads back to it.
 //!
 //! The canonical emitter is the unit cube that light leaves through z = 1. The canonical receiver is the unit

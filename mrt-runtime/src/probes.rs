@@ -3,8 +3,8 @@
 //! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
 //! walls, so both show the same light. Between probes the light is interpolated, across openings too.
 
-use crate::scene::{Beyond, Scene, SceneBlock};
-use glam::{DMat3, DVec3, Vec3};
+use crate::scene::{Beyond, Scene};
+use glam::{DVec3, Vec3};
 use mrt_core::cube::Face;
 use mrt_core::matrix::{Matrix, MatrixView, multiply_add};
 use mrt_core::sh;
@@ -58,7 +58,7 @@ impl Probes {
             rotations: scene
                 .blocks
                 .iter()
-                .map(|block| sh::rotation_matrices(3, &rotation_of(block)))
+                .map(|block| sh::rotation_matrices(3, &block.world_from_probe))
                 .collect(),
         })
     }
@@ -71,6 +71,11 @@ impl Probes {
     /// Probes along an edge of a block.
     pub fn per_axis(&self) -> usize {
         self.per_axis
+    }
+
+    /// Number of blocks that these are the probes of.
+    pub(crate) fn block_count(&self) -> usize {
+        self.rotations.len()
     }
 
     /// All coefficients, W/(m² sr) times the square root of steradian; see [`Probes`] for their order.
@@ -124,7 +129,8 @@ impl Probes {
     }
 
     /// Light at a point of the world: trilinear between the probes around it, those of joined blocks included;
-    /// `None` outside all blocks. Coefficients beyond the probes' order are zero.
+    /// `None` outside all blocks. Coefficients beyond the probes' order are zero. Doors count as open: half a probe's
+    /// spacing next to one, light is a mean of both sides.
     pub fn at(&self, scene: &Scene, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
         let block = scene.block_at(point, LOOKUP_TOLERANCE)?;
         let unit = scene.blocks[block].warp.inverse(point)?;
@@ -200,16 +206,3 @@ pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {
     };
     Vec3::new(channel(0), channel(1), channel(2))
 }
-
-/// The rotation of a block's canonical axes to the world's: the orthogonal matrix nearest to its warp's
-/// derivative in the middle, by Newton's iteration for the polar decomposition (Higham 1986).
-fn rotation_of(block: &SceneBlock) -> DMat3 {
-    let mut rotation = block.warp.jacobian(DVec3::splat(0.5));
-    for _ in 0..POLAR_STEPS {
-        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
-    }
-    rotation
-}
-
-/// Steps of the polar decomposition: each doubles the digits, after a few for the size of the block.
-const POLAR_STEPS: usize = 40;

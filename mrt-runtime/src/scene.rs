@@ -4,7 +4,7 @@ use crate::atlas::AtlasLayout;
 use crate::light::MAX_LIGHT_VALUE;
 use crate::shape::{Aperture, Shape};
 use crate::wall::UnitFromWorld;
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
@@ -66,6 +66,8 @@ pub struct SceneBlock {
     pub coefficients: Range<usize>,
     /// Its part of the joint coefficients; the first of them take its own coefficients b.
     pub joint: Range<usize>,
+    /// Takes the axes of the block's probes to the world's: an orthogonal matrix.
+    pub world_from_probe: DMat3,
     /// Index into [`Scene::doors`] of the door in each canonical face.
     pub doors: [Option<u32>; 6],
     /// All openings as loops in the world, in the order of the shape's list.

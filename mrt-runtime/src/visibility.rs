@@ -48,7 +48,7 @@ impl Visibility for Openings {
 ///
 /// The function gets the receiver's position and the light's, both in metres, the latter pushed
 /// [`RAY_REACH`] away for lights at infinity, and returns the fraction in [0, 1] that arrives. Light still
-/// crosses walls of blocks only where the function lets it: openings are not asked.
+/// crosses walls of blocks only where the function lets it: neither openings nor doors are asked.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<F>(pub F);
 

@@ -11,9 +11,10 @@ use mrt_runtime::dictionary::{
     Sources,
 };
 use mrt_runtime::dictionary_file::{
-    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES, MAX_RESOLUTION,
+    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES,
+    MAX_RESOLUTION, MAX_VARIANTS,
 };
-use mrt_runtime::path::Word;
+use mrt_runtime::path::{MAX_WORD, Word};
 use mrt_runtime::shape::{Hole, SHAPES};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
@@ -95,8 +96,9 @@ enum Section {
     Numbers(Vec<f32>),
 }
 
-/// Resolution, probes, shapes, lightfield, emission and response modes, no vertical openings, no holes.
-const SIZES: [u32; 8] = [2, 1, 2, 2, 2, 2, 0, 0];
+/// Resolution, probes, shapes, variants, lightfield, emission and response modes, no vertical openings, no holes, depth
+/// of paths without and with one.
+const SIZES: [u32; 11] = [2, 1, 2, 0, 2, 2, 2, 0, 0, 2, 0];
 
 /// The sections of [`small`], by the names that the file format gives them.
 fn sections() -> Vec<(&'static str, Section)> {
@@ -108,32 +110,35 @@ fn sections() -> Vec<(&'static str, Section)> {
         ("sizes", Sizes(SIZES.to_vec())),
         ("dropped", zeros(3)),
         ("rlf.par", Parities(vec![0, 1])),
-        ("e_rlf", zeros(4)),
-        ("left", zeros(4)),
-        ("straight", zeros(4)),
-        ("exchange", zeros(0)),
-        ("T_rlf_r", zeros(4)),
-        ("words", Text("z zx")),
         ("e.par", Parities(vec![0, 1])),
         ("r.par", Parities(vec![0, 3])),
+        ("e_rlf", zeros(4)),
+        ("left", zeros(4)),
+        ("ahead", zeros(4)),
+        ("swap", zeros(0)),
+        ("T_rlf_r", zeros(4)),
+        ("words", Text("z zx")),
         ("P0", zeros(4)),
         ("P1", zeros(4)),
-        ("0.name", Text("closed")),
-        ("0.sigma", zeros(2)),
-        ("0.T_d_b", zeros(48)),
+        ("shapes", Text("closed dead_end")),
+        ("variants", Text("")),
+        ("corners", zeros(0)),
+        ("0.k", Sizes(vec![2, 3])),
+        ("0.s", zeros(2)),
+        ("0.d", zeros(2)),
+        ("0.T", zeros(48)),
         ("0.J", zeros(72)),
-        ("0.J_prb", zeros(27)),
-        ("0.J_vec", zeros(0)),
-        ("0.L_imp", zeros(48)),
-        ("0.drop", zeros(2)),
-        ("1.name", Text("dead_end")),
-        ("1.sigma", zeros(2)),
-        ("1.T_d_b", zeros(40)),
+        ("0.Jp", zeros(27)),
+        ("0.Jv", zeros(0)),
+        ("0.L", zeros(48)),
+        ("1.k", Sizes(vec![2, 3])),
+        ("1.s", zeros(2)),
+        ("1.d", zeros(2)),
+        ("1.T", zeros(40)),
         ("1.J", zeros(60)),
-        ("1.J_prb", zeros(27)),
-        ("1.J_vec", zeros(0)),
-        ("1.L_imp", zeros(40)),
-        ("1.drop", zeros(2)),
+        ("1.Jp", zeros(27)),
+        ("1.Jv", zeros(0)),
+        ("1.L", zeros(40)),
         ("1.E0", zeros(4)),
         ("1.Q0", zeros(6)),
         ("B_e", zeros(40)),
@@ -263,11 +268,14 @@ fn absurd_sizes_are_refused_by_name() {
         ("resolution", 1, MAX_RESOLUTION),
         ("number of probes along an edge", 0, MAX_PROBES),
         ("number of shapes", 1, SHAPES.len()),
-        ("number of lightfield modes", 1, MAX_MODES),
+        ("number of variants", 0, MAX_VARIANTS),
+        ("number of lightfield modes", 0, MAX_MODES),
         ("number of emission modes", 1, MAX_MODES),
         ("number of response modes", 1, MAX_MODES),
         ("mark of vertical openings", 0, 1),
         ("number of holes", 0, Hole::ALL.len()),
+        ("depth of paths", 0, MAX_WORD),
+        ("depth of paths with holes", 0, MAX_WORD),
     ]
     .into_iter()
     .enumerate()
@@ -288,8 +296,8 @@ fn absurd_sizes_are_refused_by_name() {
     }
     // More joint modes than the limit, and fewer than the shape's own.
     for joint in [MAX_MODES + 1, 1] {
-        let basis = Section::Numbers(vec![0.25; 24 * joint]);
-        let error = read(&with("0.J", basis)).expect_err("absurd");
+        let modes = Section::Sizes(vec![2, joint as u32]);
+        let error = read(&with("0.k", modes)).expect_err("absurd");
         assert!(
             matches!(error, DictionaryError::Size { found, .. } if found == joint),
             "{error}"
@@ -299,7 +307,6 @@ fn absurd_sizes_are_refused_by_name() {
 
 #[test]
 fn sections_of_the_wrong_length_or_type_are_refused() {
-    let decides = |name: &str| name.ends_with("sigma") || name.ends_with(".J");
     for (name, section) in sections() {
         let (shorter, longer, other) = match section {
             Section::Text(_) => continue,
@@ -321,13 +328,7 @@ fn sections_of_the_wrong_length_or_type_are_refused() {
         };
         for section in [shorter, longer] {
             match read(&with(name, section)) {
-                // The number of modes follows from `sigma` and that of joint modes from the basis, so another
-                // matrix is then the wrong one.
-                Err(DictionaryError::Length { section, .. }) => {
-                    assert!(section == name || decides(name), "{name}: {section}");
-                }
-                // Other modes than the matrices have.
-                Err(DictionaryError::Size { .. }) if decides(name) => {}
+                Err(DictionaryError::Length { section, .. }) => assert_eq!(section, name),
                 other => panic!("{name}: {other:?}"),
             }
         }
@@ -381,7 +382,7 @@ fn numbers_that_are_none_are_refused() {
 
 #[test]
 fn unknown_and_repeated_shapes_are_refused() {
-    let error = read(&with("0.name", Section::Text("sphere"))).expect_err("unknown");
+    let error = read(&with("shapes", Section::Text("sphere dead_end"))).expect_err("unknown");
     assert!(
         matches!(error, DictionaryError::UnknownShape { index: 0, .. }),
         "{error}"

@@ -152,8 +152,9 @@ fn feedback_inside_a_block_never_grows() {
         );
         let radius = spectral_radius(&feedback);
         println!("{}: radius of T U {radius:.7}", entry.shape.name);
-        // A closed white cube loses nothing: its radius is 1, which `f32` storage moves by 1e-7.
-        assert!(radius <= 1.0 + 1e-6, "{}: {radius}", entry.shape.name);
+        // A closed white cube loses nothing: its radius is 1, which half precision moves by 8e-5 (an element is good to
+        // 2.4e-4, and T and U are products of many).
+        assert!(radius <= 1.0 + 2e-4, "{}: {radius}", entry.shape.name);
     }
 }
 

@@ -204,6 +204,9 @@ fn adapted(level: &Level, estimates: &[BlockEstimate], args: &AdaptArgs) -> Leve
             Target::Regathered => WarpTransport::Regathered,
             Target::Rebuilt => WarpTransport::Rebuilt,
         };
+        if block.shape.tube().is_some() {
+            block.transport = WarpTransport::Canonical;
+        }
         if has_hole(block.shape) && block.transport == WarpTransport::Rebuilt {
             block.transport = WarpTransport::Regathered;
         }

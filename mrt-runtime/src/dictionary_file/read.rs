@@ -280,6 +280,10 @@ fn read_variants<'a>(
 fn variant_of_name(name: &str, shapes: &[Operators]) -> Option<(WarpTransport, &'static Shape)> {
     let (shape, transport) = name.split_once(':')?;
     let shape = shapes.iter().find(|entry| entry.shape.name == shape)?.shape;
+    // Round tubes have none.
+    if shape.tube().is_some() {
+        return None;
+    }
     let transport = [
         WarpTransport::Canonical,
         WarpTransport::Regathered,

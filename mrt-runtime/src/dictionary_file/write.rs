@@ -1,6 +1,6 @@
 //! Writes version 2.
 
-use super::{DictionaryError, FORMAT};
+use super::{DictionaryError, FORMAT, MAX_VARIANTS, check_size};
 use crate::dictionary::{Dictionary, OperatorKind, OperatorMatrix, ShapeOperators, WarpTransport};
 use mrt_core::container::{ContainerError, Writer};
 use mrt_core::storage::write_stored;
@@ -9,12 +9,14 @@ impl<M: OperatorMatrix> Dictionary<M> {
     /// The bytes of a dictionary file, matrices as they are stored here; the same dictionary gives the same bytes.
     ///
     /// # Errors
-    /// [`DictionaryError::Container`], if there are more matrices than the container has room for.
+    /// [`DictionaryError::Container`], if there are more matrices than the container has room for, and
+    /// [`DictionaryError::Size`] for more than [`MAX_VARIANTS`] variants.
     ///
     /// # Panics
     /// If an element is infinite or not a number.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DictionaryError> {
         let (fields, paths) = (&self.lightfields, &self.paths);
+        check_size("number of variants", self.variants.len(), 0, MAX_VARIANTS)?;
         let mut writer = Writer::new(FORMAT);
         writer.add_text("preset", &self.preset)?;
         writer.add_text("settings", &self.settings)?;
