@@ -4,8 +4,9 @@
 //! A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of
 //! openings that turns back carries nothing and is left out; the paper follows all sequences. Either the
 //! dictionary's table has the operator of a whole sequence ([`table`]), or lightfields are passed on from opening
-//! to opening as in the paper ([`lightfield`]); longer sequences than the table's take the second way. Both give responses at the openings that light enters through,
-//! and those are projected on the joint basis of the block behind, where the paper keeps a basis for each opening.
+//! to opening as in the paper ([`lightfield`]); sequences longer than the table's take the second way, if the
+//! dictionary has lightfields. Both give responses at the openings that light enters through, and those are projected
+//! on the joint basis of the block behind, where the paper keeps a basis for each opening.
 
 mod lightfield;
 mod table;

@@ -175,7 +175,7 @@ impl Exact {
 
 /// Relative L2 by area and relative level: of everything, and of each block.
 fn errors(level: &Level, exact: &Exact, found: &[f64], truth: &[f64]) -> Vec<(f64, f64)> {
-    let mut ranges = vec![0..truth.len()];
+    let mut ranges: Vec<_> = std::iter::once(0..truth.len()).collect();
     let mut start = 0;
     for block in &level.blocks {
         let end = start + block.shape.texel_count(RESOLUTION);

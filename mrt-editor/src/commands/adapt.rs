@@ -80,7 +80,7 @@ pub enum AdaptError {
         found: f64,
     },
     /// Both outputs are one file, or there is no place for one.
-    #[error("--out-level and --out-dictionary {}: expected two files", path.display())]
+    #[error("--out-dictionary {}: expected another file than the levels", path.display())]
     SameFile {
         /// The file.
         path: PathBuf,
@@ -174,6 +174,14 @@ fn check(args: &AdaptArgs) -> Result<(), AdaptError> {
         if !(0.0..=f64::MAX).contains(&found) {
             return Err(AdaptError::Threshold { name, found });
         }
+    }
+    // The level may be adapted in place; a dictionary in its place would lose it.
+    if let Some(dictionary) = &args.out_dictionary
+        && is_same_place(&args.level, dictionary)
+    {
+        return Err(AdaptError::SameFile {
+            path: args.level.clone(),
+        });
     }
     if let (Some(level), Some(dictionary)) = (&args.out_level, &args.out_dictionary)
         && (level == dictionary || is_same_place(level, dictionary))

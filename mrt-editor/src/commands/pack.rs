@@ -3,19 +3,21 @@
 use crate::commands::accuracy::CouplingArg;
 use crate::commands::info::{StorageArg, kind_bytes};
 use crate::dictionary_source::{DEFAULT_DICTIONARY, SourceError, read_dictionary_file};
+use crate::level_file::{LevelFileError, read_level};
+use crate::output::is_same_place;
 use crate::table::Table;
 use mrt_core::container::{ByteBudget, ContainerError, write_file_atomically};
 use mrt_runtime::assemble::AssembleError;
 use mrt_runtime::dictionary::{OperatorKind, StoredDictionary};
 use mrt_runtime::dictionary_file::{DEFAULT_BYTE_BUDGET, DictionaryError};
-use mrt_runtime::level_text::{LevelTextError, from_text};
 use mrt_runtime::pack::{PackConfig, pack};
 use serde::Serialize;
 use std::path::PathBuf;
 
 /// Writes the part of a dictionary that a level uses: its shapes and the paths that light takes in it.
 ///
-/// Frames are the same as with the whole dictionary, to the last bit unless --storage changes.
+/// Frames are the same as with the whole dictionary, to the last bit, unless --storage changes or --coupling table ends
+/// light at the table's longest path.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PackArgs {
     /// Level file.
@@ -49,21 +51,14 @@ pub struct PackArgs {
 /// Why nothing was packed.
 #[derive(Debug, thiserror::Error)]
 pub enum PackError {
-    /// The level cannot be read.
-    #[error("cannot read the level {file}: {source}")]
-    LevelFile {
+    /// The level cannot be read, or is at fault.
+    #[error(transparent)]
+    Level(#[from] LevelFileError),
+    /// The output would replace the level.
+    #[error("--out {}: expected another file than the level", path.display())]
+    SameFile {
         /// The file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The level is at fault.
-    #[error("{file}: {source}")]
-    Level {
-        /// The file.
-        file: String,
-        /// What is wrong.
-        source: LevelTextError,
+        path: PathBuf,
     },
     /// There is no dictionary.
     #[error(transparent)]
@@ -108,12 +103,12 @@ struct KindReport {
 /// # Errors
 /// [`PackError`]; the file is then as it was.
 pub fn run(args: &PackArgs) -> Result<(), PackError> {
-    let file = args.level.display().to_string();
-    let text = std::fs::read_to_string(&args.level).map_err(|source| PackError::LevelFile {
-        file: file.clone(),
-        source,
-    })?;
-    let level = from_text(&text).map_err(|source| PackError::Level { file, source })?;
+    let level = read_level(&args.level)?;
+    if is_same_place(&args.level, &args.out) {
+        return Err(PackError::SameFile {
+            path: args.out.clone(),
+        });
+    }
     let (bytes, place) = match &args.dictionary {
         Some(path) => (read_dictionary_file(path)?, path.display().to_string()),
         None => (

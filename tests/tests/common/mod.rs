@@ -172,11 +172,7 @@ pub fn exact_of(level: &Level, resolution: usize) -> ExactScene {
             })
         })
         .collect();
-    let blocks = level
-        .blocks
-        .iter()
-        .map(|block| block.warp.clone())
-        .collect();
+    let blocks = level.blocks.iter().map(|block| block.warp).collect();
     ExactScene::new(blocks, sides, resolution).expect("the level is sound")
 }
 
