@@ -262,15 +262,14 @@ fn every_transport_improves_on_the_one_before() {
 
 const BOUNDS: [[f64; 5]; 8] = [
     // Eight texels along a hall of four are coarse; `great_hall.rs` has it at sixteen.
-    [0.40, 0.17, 0.085, 0.17, 0.085],
-    [0.47, 0.036, 0.013, 0.08, 0.022],
-    // With modes chosen for probes too, the cube behind reads 20.0 % re-gathered where it read 17.7.
-    [0.45, 0.175, 0.125, 0.21, 0.20],
-    [0.25, 0.028, 0.021, 0.125, 0.125],
+    [0.40, 0.14, 0.022, 0.14, 0.022],
+    [0.48, 0.036, 0.013, 0.08, 0.022],
+    [0.45, 0.105, 0.021, 0.04, 0.038],
+    [0.25, 0.021, 0.013, 0.128, 0.128],
     [0.155, 0.014, 0.014, 0.17, 0.172],
-    [0.12, 0.066, 0.064, 0.09, 0.09],
+    [0.12, 0.037, 0.033, 0.072, 0.075],
     [0.055, 0.020, 0.018, 0.033, 0.031],
-    [0.072, 0.019, 0.019, 0.06, 0.06],
+    [0.075, 0.019, 0.019, 0.06, 0.06],
 ];
 
 /// Only the stretched blocks of a level with cubes need operators of their own.

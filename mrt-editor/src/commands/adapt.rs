@@ -80,7 +80,7 @@ pub enum AdaptError {
         found: f64,
     },
     /// Both outputs are one file, or there is no place for one.
-    #[error("--out-dictionary {}: expected another file than the levels", path.display())]
+    #[error("{}: expected two files, one for a level and one for the dictionary", path.display())]
     SameFile {
         /// The file.
         path: PathBuf,
