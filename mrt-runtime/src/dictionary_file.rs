@@ -1,7 +1,7 @@
 //! Dictionaries as bytes, in the versioned container of the core.
 //!
 //! Version 2, which is written. The values of a matrix are a section of F32, F16 or I8, column-major; unless they
-//! are F32, the next section holds its scales, one F32 a mode ([`OperatorKind::modes`]), and is named like it with a
+//! are F32, the next section holds its scales, one F32 a mode (`OperatorKind::modes`), and is named like it with a
 //! `*` behind, for which names are at most seven bytes long:
 //!
 //! | section | content |
