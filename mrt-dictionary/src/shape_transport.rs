@@ -1,9 +1,9 @@
 //! The modes of one shape, chosen for all that its light does: on its own walls, at its probes, and on the walls
 //! of the blocks beyond its openings.
 //!
-//! The paper chooses them for the own walls alone (section 4.1). The light of a spot on a wall is spread wide in
-//! its own block and still a spot for the next one, so coefficients that are best for the first err twice as much
-//! on the second.
+//! The paper chooses them for the own walls alone (section 4.1). The light of a spot on a wall is spread wide in its
+//! own block and still a spot for the next one: with the standard preset, modes for the own walls alone err by 2.08 %
+//! one opening away, and these by 1.92.
 
 use crate::bounce::{restrict_to_shape, wall_fraction};
 use crate::config::BakeConfig;

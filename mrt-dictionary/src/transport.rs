@@ -7,7 +7,7 @@
 //! light, and needs no inverse of S, whose condition reaches 1e11.
 //!
 //! Below F the outputs that a level wants besides are stacked: light at probes, and light on the walls beyond the
-//! openings. Coefficients chosen for the block's own walls alone err about twice as much on those.
+//! openings, so that coefficients are chosen for those too ([`crate::shape_transport`]).
 
 use crate::prior::ScaledBasis;
 use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
