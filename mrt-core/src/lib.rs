@@ -22,6 +22,7 @@ pub mod radiometry;
 pub mod sampling;
 pub mod sh;
 pub mod ohlsh;
+pub mod simd;
 pub mod storage;
 #[cfg(feature = "svd")]
 pub mod svd;

@@ -297,6 +297,19 @@ impl Level {
     /// # Errors
     /// [`CellsError`] when a cell is given twice.
     pub fn from_cells(cells: &[[i32; 3]], albedo: Vec3) -> Result<Level, CellsError> {
+        Self::from_joined_cells(cells, albedo, |_, _| true)
+    }
+
+    /// As [`Level::from_cells`], with a wall between cells of which `is_joined(first, second)` is false; it must say
+    /// the same for both orders.
+    ///
+    /// # Errors
+    /// [`CellsError`].
+    pub fn from_joined_cells(
+        cells: &[[i32; 3]],
+        albedo: Vec3,
+        is_joined: impl Fn(usize, usize) -> bool,
+    ) -> Result<Level, CellsError> {
         let mut index = std::collections::HashMap::new();
         for (block, &cell) in cells.iter().enumerate() {
             if let Some(first) = index.insert(cell, block) {
@@ -313,7 +326,10 @@ impl Level {
                 let step = face.outward().as_ivec3().to_array();
                 let next = std::array::from_fn(|axis| cell[axis].checked_add(step[axis]));
                 match next {
-                    [Some(x), Some(y), Some(z)] => index.get(&[x, y, z]).copied(),
+                    [Some(x), Some(y), Some(z)] => index
+                        .get(&[x, y, z])
+                        .copied()
+                        .filter(|&next| is_joined(block, next)),
                     _ => None,
                 }
             };

@@ -44,6 +44,7 @@ pub mod wall;
 pub mod path;
 pub mod level;
 pub mod level_text;
+pub mod maze;
 pub mod form;
 mod overlap;
 pub mod dictionary;
