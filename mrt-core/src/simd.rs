@@ -8,6 +8,7 @@
 //! the same bits on every machine that has it.
 
 mod lanes;
+pub mod tiles;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 #[cfg(target_arch = "x86_64")]
@@ -31,6 +32,9 @@ pub enum SimdLevel {
 }
 
 /// Code that runs with any lanes.
+///
+/// Everything that it calls with vectors must be inlined into it, or is compiled without the instructions and many times
+/// slower: functions of one's own with `#[inline(always)]`, plain loops, no closures that are given to others.
 pub trait Kernel {
     /// What it returns.
     type Output;

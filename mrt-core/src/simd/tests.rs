@@ -106,3 +106,106 @@ fn what_is_detected_runs_and_caps_hold() {
         assert_eq!(SimdLevel::from_name(cap.name()), Some(cap));
     }
 }
+
+/// A tile or half tile times three vectors.
+struct Tile<'a, E> {
+    panel: &'a [E],
+    columns: tiles::Columns<'a>,
+    x: &'a [f32],
+    is_half: bool,
+}
+
+impl<E: tiles::Element> Kernel for Tile<'_, E> {
+    type Output = tiles::TileSums;
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> tiles::TileSums {
+        let mut sums = [[0.5; tiles::TILE]; 3];
+        let x = tiles::Rgb::new(self.x);
+        if self.is_half {
+            tiles::add_half_tile(l, self.panel, self.columns, x, &mut sums);
+        } else {
+            let mut twice = [[[0.25; tiles::TILE]; 3]; 2];
+            let [first, second] = &mut twice;
+            tiles::add_two_tiles(l, [self.panel; 2], self.columns, x, [first, second]);
+            tiles::add_tile(l, self.panel, self.columns, x, &mut sums);
+            // The same panel three times; sums of columns may be taken in another order.
+            for (pair, single) in twice[0].iter().zip(&sums) {
+                for (a, b) in pair.iter().zip(single) {
+                    assert!((a + 0.25 - b).abs() < 2e-6);
+                }
+            }
+            assert_eq!(twice[0], twice[1]);
+        }
+        sums
+    }
+}
+
+struct Dot<'a> {
+    rows: &'a [f32],
+    x: [&'a [f32]; 3],
+}
+
+impl Kernel for Dot<'_> {
+    type Output = [[f32; 3]; tiles::DOT_ROWS];
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Self::Output {
+        tiles::dot_rows(l, self.rows, self.x)
+    }
+}
+
+/// Numbers in [-1, 1), the same everywhere.
+fn numbers(count: usize) -> Vec<f32> {
+    (0..count)
+        .map(|k| ((k * 7919 + 13) % 2048) as f32 / 1024.0 - 1.0)
+        .collect()
+}
+
+#[test]
+fn tiles_are_products_at_every_level_for_every_number_of_columns() {
+    for count in 0..11 {
+        let columns: Vec<u16> = (0..count).map(|k| (k * 5 % 12) as u16).collect();
+        let mut lists = tiles::ColumnLists::default();
+        let range = lists.push(columns.iter().copied());
+        let x = numbers(36);
+        let panel = numbers(count * 16);
+        for (is_half, rows) in [(false, 16), (true, 8)] {
+            for level in SimdLevel::available() {
+                let found = level.run(Tile {
+                    panel: &panel,
+                    columns: lists.get(range.clone()),
+                    x: &x,
+                    is_half,
+                });
+                for channel in 0..3 {
+                    for row in 0..16 {
+                        let product = |(k, &column): (usize, &u16)| {
+                            let x = x[channel * 12 + usize::from(column)];
+                            f64::from(panel[k * rows + row]) * f64::from(x)
+                        };
+                        let sum: f64 = columns.iter().enumerate().map(product).sum();
+                        let expected = 0.5 + if row < rows { sum } else { 0.0 };
+                        let apart = (f64::from(found[channel][row]) - expected).abs();
+                        // Numbers of size 1, twelve roundings of 6e-8.
+                        assert!(apart < 2e-6, "{level:?}, {count} columns: {apart}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn dot_products_are_those_of_the_reference() {
+    let (rows, x) = (numbers(4 * 48), numbers(3 * 48));
+    let x = std::array::from_fn(|c| &x[c * 48..(c + 1) * 48]);
+    for level in SimdLevel::available() {
+        let found = level.run(Dot { rows: &rows, x });
+        for (row, found) in found.iter().enumerate() {
+            for (channel, &found) in found.iter().enumerate() {
+                let products = rows[row * 48..].iter().zip(x[channel]);
+                let sum: f64 = products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                assert!((f64::from(found) - sum).abs() < 5e-6, "{level:?}");
+            }
+        }
+    }
+}
