@@ -5,36 +5,9 @@ use glam::{DVec3, IVec3};
 use mrt_core::cube::Face;
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::parity::ParityClasses;
-use mrt_runtime::shape::{Outline, Shape};
+use mrt_runtime::mirrors::mirrors;
+use mrt_runtime::shape::Shape;
 use std::collections::HashMap;
-
-/// True if the map takes every opening to one of the same outline; holes know up, so it must keep y there.
-fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
-    shape.openings.iter().all(|opening| {
-        let same = shape
-            .opening(map.face(opening.face))
-            .is_some_and(|image| image.outline == opening.outline);
-        let keeps_up = map.face(Face::PosY) == Face::PosY;
-        same && (keeps_up || opening.outline == Outline::Whole)
-    })
-}
-
-/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of
-/// two axes neither of which has one.
-fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
-    let axes: Vec<usize> = (0..3)
-        .filter(|&axis| keeps(CubeSymmetry::mirror(axis), shape))
-        .collect();
-    let exchange = [(0, 2), (0, 1), (1, 2)]
-        .into_iter()
-        .filter(|(a, b)| !axes.contains(a) && !axes.contains(b))
-        .map(|(a, b)| CubeSymmetry::exchange(a, b))
-        .find(|&map| keeps(map, shape));
-    axes.into_iter()
-        .map(CubeSymmetry::mirror)
-        .chain(exchange)
-        .collect()
-}
 
 /// Parity classes of the shape's texels: eight for cube, straight and cross, four for most others.
 pub fn texel_parity_classes(shape: &Shape, resolution: usize) -> ParityClasses {

@@ -197,7 +197,7 @@ impl<'a> LevelView<'a> {
             .shape
             .wall_offset(patch.face, self.scene.resolution)
             .map_or(Vec3::ZERO, |offset| {
-                self.scene.texel_albedo[block.texels.start + offset + texel]
+                self.scene.texel_albedo(block.texels.start + offset + texel)
             });
         (direct * albedo / PI, indirect * albedo / PI)
     }

@@ -83,10 +83,10 @@ pub fn measure(
     let direct = exact_direct(&exact, lights)?;
     let exact_seconds = start.elapsed().as_secs_f64();
     frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
-    let our_first = in_level_order(level, scene, frame.indirect());
+    let our_first = in_level_order(level, scene, &frame.indirect());
     frame.solve(scene, lights, &Openings, Bounces::Count(bounces))?;
-    let our_many = in_level_order(level, scene, frame.indirect());
-    let our_direct = in_level_order(level, scene, frame.direct());
+    let our_many = in_level_order(level, scene, &frame.indirect());
+    let our_direct = in_level_order(level, scene, &frame.direct());
     let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<_>>();
     Ok(LevelErrors {
         first_bounce: rel_l2(&our_first, &first),

@@ -4,14 +4,17 @@ use crate::atlas::AtlasLayout;
 use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators, WarpTransport};
 use crate::form::form_of;
 use crate::level::{Level, LevelError, Opening, corner_index};
+use crate::packed::{Operators, PackedShape, PackedTransport};
 use crate::path::hole_of;
 use crate::propagate;
-use crate::scene::{Beyond, Portal, Scene, SceneBlock, SceneShape, Transport};
+use crate::scene::{Beyond, Layout, Planes, Portal, Scene, SceneBlock, Surface};
 use crate::wall::UnitFromWorld;
 use glam::{DMat3, DVec3, Vec3};
-use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
+use mrt_core::simd::tiles::HALF_TILE;
+use mrt_core::storage::Storage;
+use std::sync::Arc;
 
 /// Settings of [`assemble`].
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +25,12 @@ pub struct AssembleConfig {
     pub max_depth: usize,
     /// Bytes that texels and `T_b->r` may take together.
     pub max_bytes: usize,
+    /// How shapes' operators are kept. They are few, so `f32`, the fastest, costs little.
+    pub shape_storage: Storage,
+    /// How `T_b->r` is kept, the largest part of a large level. `f16` errs by 0.02 %.
+    pub transport_storage: Storage,
+    /// Share in L2, in [0, 1), of the light from one block to another that may be left out where that saves work.
+    pub negligible: f32,
 }
 
 /// How light is taken from block to block.
@@ -48,6 +57,9 @@ impl Default for AssembleConfig {
             coupling: Coupling::default(),
             max_depth: 8,
             max_bytes: 2 << 30,
+            shape_storage: Storage::F32,
+            transport_storage: Storage::F16,
+            negligible: 0.0,
         }
     }
 }
@@ -172,33 +184,24 @@ pub fn assemble(
                 expected: config.max_bytes,
                 found: texel_bytes,
             })?;
+    let areas = shape_areas(level, &blocks, &used, resolution);
+    let shapes: Vec<PackedShape> = used
+        .iter()
+        .zip(&areas)
+        .map(|(&entry, areas)| pack_shape(entry, areas, resolution, config.shape_storage))
+        .collect();
+    let layout = Arc::new(layout(&blocks, &shapes));
     let mut scene = Scene {
         resolution,
-        shapes: used
-            .iter()
-            .map(|&entry| scene_shape(entry, resolution))
-            .collect(),
-        texel_positions: Vec::new(),
-        texel_normals: Vec::new(),
-        texel_albedo: Vec::new(),
-        texel_emission: Vec::new(),
-        transport: Transport {
-            steady: BlockSparse::from_blocks(&[], &[], Vec::new()),
-            gated: Vec::new(),
-        },
-        coefficient_count: blocks.last().map_or(0, |b| b.coefficients.end),
-        joint_count: blocks.last().map_or(0, |b| b.joint.end),
+        surface: surface(level, &blocks, &shapes, &layout, resolution),
+        transport: PackedTransport::default(),
         doors: level.doors.iter().map(|door| door.value).collect(),
         probes: dictionary.probes,
-        atlas: AtlasLayout::new(&blocks, resolution),
+        atlas: AtlasLayout::new(&blocks, resolution, &layout),
         blocks,
+        shapes,
+        layout,
     };
-    place_texels(&mut scene, level);
-    for (block, placed) in level.blocks.iter().zip(&scene.blocks) {
-        if block.transport != WarpTransport::Canonical {
-            scene.shapes[placed.shape_index].texel_areas = warped_areas(placed, resolution);
-        }
-    }
     scene.transport =
         propagate::joint_from_coefficients(&scene, dictionary, &used, config, operator_bytes)?;
     Ok(scene)
@@ -448,9 +451,107 @@ fn crossing(
     }
 }
 
-fn place_texels(scene: &mut Scene, level: &Level) {
-    for (block, placed) in level.blocks.iter().zip(&scene.blocks) {
-        for (face, unit) in placed.shape.texels(scene.resolution) {
+/// Areas of the texels of each shape; none where all are 1.
+fn shape_areas(
+    level: &Level,
+    blocks: &[SceneBlock],
+    used: &[&ShapeOperators<impl OperatorMatrix>],
+    resolution: usize,
+) -> Vec<Vec<f32>> {
+    let of_shape = |entry: &&ShapeOperators<_>| entry.shape.relative_texel_areas(resolution);
+    let mut areas: Vec<Vec<f32>> = used.iter().map(of_shape).collect();
+    let mut known = vec![false; areas.len()];
+    for (block, placed) in level.blocks.iter().zip(blocks) {
+        let shape = placed.shape_index;
+        if block.transport != WarpTransport::Canonical && !known[shape] {
+            areas[shape] = warped_areas(placed, resolution);
+            known[shape] = true;
+        }
+    }
+    areas
+}
+
+fn pack_shape(
+    entry: &ShapeOperators<impl OperatorMatrix>,
+    areas: &[f32],
+    resolution: usize,
+    storage: Storage,
+) -> PackedShape {
+    let operators = Operators {
+        coefficients_from_direct: &entry.coefficients_from_direct.decode(),
+        joint_basis: &entry.joint_basis.decode(),
+        probe_basis: &entry.probe_basis.decode(),
+        vector_basis: &entry.vector_basis.decode(),
+        areas,
+    };
+    PackedShape::new(entry.shape, resolution, &operators, storage)
+}
+
+/// Blocks sorted by shape, and where each one's part begins.
+fn layout(blocks: &[SceneBlock], shapes: &[PackedShape]) -> Layout {
+    let mut order: Vec<u32> = (0..blocks.len() as u32).collect();
+    let shape_of = |block: u32| blocks[block as usize].shape_index;
+    order.sort_by_key(|&block| (shape_of(block), block));
+    let mut rank = vec![0; order.len()];
+    let mut slots = Vec::with_capacity(order.len());
+    let mut next = 0;
+    for (place, &block) in order.iter().enumerate() {
+        rank[block as usize] = place as u32;
+        let count = shapes[shape_of(block)].folding.slots();
+        slots.push(next..next + count);
+        next += count;
+    }
+    let most = |count: fn(&PackedShape) -> usize| {
+        let most = shapes.iter().map(count).max().unwrap_or(0);
+        most.next_multiple_of(HALF_TILE)
+    };
+    Layout {
+        shapes: order.iter().map(|&block| shape_of(block) as u32).collect(),
+        modes: order
+            .iter()
+            .map(|&block| shapes[shape_of(block)].modes as u32)
+            .collect(),
+        slot_of_texel: shapes
+            .iter()
+            .map(|shape| shape.folding.slot_of_texel.clone())
+            .collect(),
+        coefficient_stride: most(|shape| shape.modes),
+        joint_stride: most(|shape| shape.joint_modes),
+        order,
+        rank,
+        slots,
+    }
+}
+
+fn surface(
+    level: &Level,
+    blocks: &[SceneBlock],
+    shapes: &[PackedShape],
+    layout: &Layout,
+    resolution: usize,
+) -> Surface {
+    let planes = || Planes::new(layout.slot_count());
+    let mut surface = Surface {
+        positions: planes(),
+        normals: planes(),
+        albedo: planes(),
+        emission: planes(),
+        emitting: Vec::new(),
+        revision: Surface::next_revision(),
+    };
+    for (place, &index) in layout.order.iter().enumerate() {
+        let (block, placed) = (&level.blocks[index as usize], &blocks[index as usize]);
+        let texels: Vec<(Face, DVec3)> = placed.shape.texels(resolution).collect();
+        let start = layout.slots[place].start;
+        let mut emits = false;
+        let folding = &shapes[placed.shape_index].folding;
+        for (slot, &texel) in folding.texel_of_slot.iter().enumerate() {
+            let slot = start + slot;
+            let Some(&(face, unit)) = texels.get(texel as usize) else {
+                // Nobody's: it stands in the middle and, without a normal, gets no light.
+                surface.positions.set(slot, placed.warp.center().as_vec3());
+                continue;
+            };
             let normal = match placed.shape.tube() {
                 None => {
                     let (u, v) = (unit[face.u_axis()], unit[face.v_axis()]);
@@ -462,30 +563,21 @@ fn place_texels(scene: &mut Scene, level: &Level) {
                     point.warped_normal(&placed.warp)
                 }
             };
-            scene
-                .texel_positions
-                .push(placed.warp.point(unit).as_vec3());
-            scene.texel_normals.push(normal.as_vec3());
-            let turned = placed.orientation.face(face);
+            surface
+                .positions
+                .set(slot, placed.warp.point(unit).as_vec3());
+            surface.normals.set(slot, normal.as_vec3());
             // What is in a hole neither reflects nor emits.
-            let is_wall = !placed.shape.is_in_hole(face, unit);
-            let of_wall = |colour: Vec3| if is_wall { colour } else { Vec3::ZERO };
-            scene
-                .texel_albedo
-                .push(of_wall(block.albedo[turned.index()]));
-            scene
-                .texel_emission
-                .push(of_wall(block.emission[turned.index()]));
+            if !placed.shape.is_in_hole(face, unit) {
+                let turned = placed.orientation.face(face).index();
+                surface.albedo.set(slot, block.albedo[turned]);
+                surface.emission.set(slot, block.emission[turned]);
+                emits |= block.emission[turned] != Vec3::ZERO;
+            }
+        }
+        if emits {
+            surface.emitting.push(place as u32);
         }
     }
-}
-
-fn scene_shape(entry: &ShapeOperators<impl OperatorMatrix>, resolution: usize) -> SceneShape {
-    SceneShape {
-        coefficients_from_direct: entry.coefficients_from_direct.decode().into_owned(),
-        joint_basis: entry.joint_basis.decode().into_owned(),
-        probe_basis: entry.probe_basis.decode().into_owned(),
-        vector_basis: entry.vector_basis.decode().into_owned(),
-        texel_areas: entry.shape.relative_texel_areas(resolution),
-    }
+    surface
 }

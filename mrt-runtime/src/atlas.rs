@@ -5,7 +5,8 @@
 //! creases inside a block it repeats the wall's own edge. The charts of a tube meet without a crease, and show
 //! one another.
 
-use crate::scene::{Beyond, SceneBlock};
+use crate::executor::{Executor, run_parts, task_count};
+use crate::scene::{Beyond, Layout, Planes, SceneBlock};
 use crate::shape::Shape;
 use glam::{DVec3, Vec2};
 use mrt_core::cube::Face;
@@ -19,22 +20,17 @@ pub struct AtlasLayout {
     pub height: usize,
     /// First pixel of each (block, wall) tile's border, by block and [`Face::index`].
     tiles: Vec<[Option<[usize; 2]>; 6]>,
-    records: Vec<CopyRecord>,
+    /// By tile, one a pixel, row by row: the slot that it shows, `u32::MAX` for none.
+    slots: Vec<u32>,
+    /// By place of a block: the tiles that show it are `shown[shown_by[k]..shown_by[k + 1]]`.
+    shown: Vec<u32>,
+    shown_by: Vec<u32>,
     resolution: usize,
-}
-
-/// A texel that is copied to a pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct CopyRecord {
-    pixel: u32,
-    block: u32,
-    /// Within the block.
-    texel: u32,
 }
 
 impl AtlasLayout {
     /// Lays out the walls of all blocks in a nearly square image.
-    pub(crate) fn new(blocks: &[SceneBlock], resolution: usize) -> Self {
+    pub(crate) fn new(blocks: &[SceneBlock], resolution: usize, layout: &Layout) -> Self {
         let wall_count: usize = blocks.iter().map(|block| block.shape.walls().count()).sum();
         let tile = resolution + 2;
         let columns = (1..)
@@ -42,46 +38,51 @@ impl AtlasLayout {
             .unwrap_or(wall_count)
             .max(1);
         let rows = wall_count.div_ceil(columns);
-        let mut layout = Self {
+        let mut atlas = Self {
             width: columns * tile,
             height: rows * tile,
             tiles: vec![[None; 6]; blocks.len()],
-            records: Vec::with_capacity(wall_count * tile * tile),
+            slots: Vec::with_capacity(wall_count * tile * tile),
+            shown: Vec::new(),
+            shown_by: Vec::new(),
             resolution,
         };
         let mut next = 0;
+        // (place of a block, tile that shows it)
+        let mut shows: Vec<(u32, u32)> = Vec::new();
         for (index, block) in blocks.iter().enumerate() {
             for face in block.shape.walls() {
                 let origin = [next % columns * tile, next / columns * tile];
-                layout.tiles[index][face.index()] = Some(origin);
-                layout.record_tile(blocks, index, face, origin);
+                atlas.tiles[index][face.index()] = Some(origin);
+                let first = shows.len();
+                for row in 0..tile {
+                    for column in 0..tile {
+                        let place = [column as isize - 1, row as isize - 1];
+                        let seen = texel_seen(blocks, index, face, place, resolution);
+                        atlas.slots.push(seen.map_or(u32::MAX, |(block, texel)| {
+                            let rank = layout.rank[block];
+                            if !shows[first..].contains(&(rank, next as u32)) {
+                                shows.push((rank, next as u32));
+                            }
+                            let map = &layout.slot_of_texel[blocks[block].shape_index];
+                            layout.slots[rank as usize].start as u32 + map[texel]
+                        }));
+                    }
+                }
                 next += 1;
             }
         }
-        layout
-    }
-
-    fn record_tile(&mut self, blocks: &[SceneBlock], block: usize, face: Face, origin: [usize; 2]) {
-        let tile = self.resolution + 2;
-        for row in 0..tile {
-            for column in 0..tile {
-                let texel = texel_seen(
-                    blocks,
-                    block,
-                    face,
-                    [column as isize - 1, row as isize - 1],
-                    self.resolution,
-                );
-                if let Some((block, texel)) = texel {
-                    let pixel = (origin[1] + row) * self.width + origin[0] + column;
-                    self.records.push(CopyRecord {
-                        pixel: pixel as u32,
-                        block: block as u32,
-                        texel: texel as u32,
-                    });
-                }
+        shows.sort_unstable();
+        let mut at = 0;
+        for place in 0..blocks.len() as u32 {
+            atlas.shown_by.push(at as u32);
+            while at < shows.len() && shows[at].0 == place {
+                atlas.shown.push(shows[at].1);
+                at += 1;
             }
         }
+        atlas.shown_by.push(at as u32);
+        atlas
     }
 
     /// Pixel coordinates (x to the right, y down the rows, pixel centres at halves) at which a bilinear
@@ -120,17 +121,69 @@ impl AtlasLayout {
         })
     }
 
-    /// Copies texels (in the frame's order) to the image.
-    pub(crate) fn fill(&self, blocks: &[SceneBlock], texels: &[f32], image: &mut [[f32; 3]]) {
-        for record in &self.records {
-            let range = &blocks[record.block as usize].texels;
-            let start = 3 * range.start + record.texel as usize;
-            let count = range.len();
-            image[record.pixel as usize] = [
-                texels[start],
-                texels[start + count],
-                texels[start + 2 * count],
-            ];
+    /// Length that a list of tiles may have in [`AtlasLayout::fill`].
+    pub(crate) fn tile_list_size(&self) -> usize {
+        self.shown.len()
+    }
+
+    /// Copies texels to the tiles that show the changed blocks; `tiles` is room for their list.
+    pub(crate) fn fill(
+        &self,
+        changed: &[u32],
+        tiles: &mut Vec<u32>,
+        texels: &Planes,
+        image: &mut [[f32; 3]],
+        executor: &dyn Executor,
+    ) {
+        tiles.clear();
+        for &place in changed {
+            let place = place as usize;
+            let (start, end) = (self.shown_by[place], self.shown_by[place + 1]);
+            tiles.extend_from_slice(&self.shown[start as usize..end as usize]);
+        }
+        tiles.sort_unstable();
+        tiles.dedup();
+        let (Some(&first), Some(&last)) = (tiles.first(), tiles.last()) else {
+            return;
+        };
+        let tile = self.resolution + 2;
+        let columns = (self.width / tile) as u32;
+        let rows = (first / columns) as usize..(last / columns) as usize + 1;
+        let tasks = task_count(executor, rows.len());
+        let channels = texels.channels();
+        let mut image = &mut image[rows.start * tile * self.width..];
+        let mut tiles = &tiles[..];
+        let parts = (0..tasks).map(|k| {
+            let (from, to) = (k * rows.len() / tasks, (k + 1) * rows.len() / tasks);
+            let taken = std::mem::take(&mut image);
+            let (part, rest) = taken.split_at_mut((to - from) * tile * self.width);
+            image = rest;
+            let end = (rows.start + to) as u32 * columns;
+            let (list, rest) = tiles.split_at(tiles.partition_point(|&t| t < end));
+            tiles = rest;
+            (list, rows.start + from, part)
+        });
+        run_parts(executor, parts, |(list, first_row, image)| {
+            for &index in list {
+                let (row, column) = (index / columns, index % columns);
+                let slots = &self.slots[index as usize * tile * tile..][..tile * tile];
+                let first = (row as usize - first_row) * tile * self.width;
+                let first = first + column as usize * tile;
+                for (k, slots) in slots.chunks_exact(tile).enumerate() {
+                    let pixels = &mut image[first + k * self.width..][..tile];
+                    copy_row(slots, channels, pixels);
+                }
+            }
+        });
+    }
+}
+
+fn copy_row(slots: &[u32], [red, green, blue]: [&[f32]; 3], pixels: &mut [[f32; 3]]) {
+    for (pixel, &slot) in pixels.iter_mut().zip(slots) {
+        let slot = slot as usize;
+        // Pixels that show nothing stay as they are.
+        if let (Some(&r), Some(&g), Some(&b)) = (red.get(slot), green.get(slot), blue.get(slot)) {
+            *pixel = [r, g, b];
         }
     }
 }

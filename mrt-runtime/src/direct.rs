@@ -6,37 +6,6 @@ use crate::visibility::{Receiver, Toward, Visibility};
 use glam::{DVec3, Vec3};
 use mrt_core::radiometry::sphere_light_irradiance;
 
-/// Writes direct irradiance, W/m², for all texels: block by block, and in a block channel by channel.
-///
-/// Cost: one evaluation and one visibility query a texel and light.
-pub(crate) fn direct_light<V: Visibility>(
-    scene: &Scene,
-    lights: &[PlacedLight],
-    doors: &[f32],
-    visibility: &V,
-    direct: &mut [f32],
-) {
-    for (index, block) in scene.blocks.iter().enumerate() {
-        let count = block.texels.len();
-        let out = &mut direct[3 * block.texels.start..3 * block.texels.end];
-        let (red, rest) = out.split_at_mut(count);
-        let (green, blue) = rest.split_at_mut(count);
-        for (k, texel) in block.texels.clone().enumerate() {
-            let position = scene.texel_positions[texel].as_dvec3();
-            let normal = scene.texel_normals[texel].as_dvec3();
-            let receiver = Receiver {
-                block: index,
-                position,
-            };
-            let mut sum = Vec3::ZERO;
-            for light in lights {
-                sum += irradiance(scene, light, doors, receiver, normal, visibility);
-            }
-            (red[k], green[k], blue[k]) = (sum.x, sum.y, sum.z);
-        }
-    }
-}
-
 /// Irradiance, W/m² per channel, from one light at one point of a surface with unit `normal`.
 pub fn irradiance<V: Visibility>(
     scene: &Scene,

@@ -1,13 +1,28 @@
 //! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
+//!
+//! Cost follows what is lit and what changed, not what is loaded. A block that no light reaches is not touched; one
+//! whose radiosity is what it was keeps its coefficients, and blocks that none of the changed ones sends light to keep
+//! their light. Everything kept has the bits that computing it again would give ([`FrameConfig::tolerance`] allows more).
 
-use crate::direct::direct_light;
-use crate::light::{Light, LightError, MAX_LIGHT_VALUE, PlacedLight, place};
+mod blocks;
+mod direct_stage;
+mod kernels;
+mod limit;
+mod pass;
+
+use crate::executor::{Executor, MAX_TASKS, Serial};
+use crate::light::{Light, LightError, MAX_LIGHT_VALUE, place};
 use crate::probes::{ProbeOrder, Probes};
-use crate::scene::Scene;
+use crate::scene::{Layout, Planes, Scene};
 use crate::visibility::Visibility;
+use blocks::Blocks;
+use direct_stage::DirectStage;
 use glam::Vec3;
-use mrt_core::matrix::{MatrixView, multiply_add};
+pub(crate) use kernels::{Expand, Scratch};
 use mrt_core::ohlsh::evaluate_f32;
+use mrt_core::simd::SimdLevel;
+use std::num::NonZero;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Lights in one frame, at most.
@@ -52,13 +67,58 @@ pub struct StageTimes {
     pub vector: Duration,
 }
 
-/// What a frame computes besides irradiance and lightmap.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// What a frame computes besides irradiance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outputs {
+    /// The lightmap.
+    pub lightmap: bool,
     /// Probes, with so many coefficients.
     pub probes: Option<ProbeOrder>,
     /// Vector irradiance at texels.
     pub vector: bool,
+}
+
+impl Default for Outputs {
+    /// The lightmap alone.
+    fn default() -> Self {
+        Self {
+            lightmap: true,
+            probes: None,
+            vector: false,
+        }
+    }
+}
+
+/// How frames are computed.
+#[derive(Clone, Debug)]
+pub struct FrameConfig {
+    /// What to compute besides irradiance.
+    pub outputs: Outputs,
+    /// Instructions to use; the scalar reference where the machine lacks them.
+    pub simd: SimdLevel,
+    /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, with
+    /// [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. Of a texel of albedo a, the light that it reflects is then off by
+    /// at most a times this at each bounce, so by `tolerance a / (1 - a)` over all. At 0, the default, what is kept is kept
+    /// because nothing about it changed, bit by bit.
+    pub tolerance: f32,
+    /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
+    /// last of them waits for n / `slice` frames, rounded up: oldest first. `None`, the default: all.
+    pub slice: Option<NonZero<usize>>,
+    /// Who does the work.
+    pub executor: Arc<dyn Executor>,
+}
+
+impl Default for FrameConfig {
+    /// The lightmap, with the best instructions that the machine has, everything up to date, on the caller's thread.
+    fn default() -> Self {
+        Self {
+            outputs: Outputs::default(),
+            simd: SimdLevel::detect(),
+            tolerance: 0.0,
+            slice: None,
+            executor: Arc::new(Serial),
+        }
+    }
 }
 
 impl StageTimes {
@@ -74,21 +134,28 @@ impl StageTimes {
     }
 }
 
-/// The buffers of a frame, made once for a scene; frames allocate nothing.
+/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`] does aside).
 ///
-/// Signals on texels are stored block by block, in a block channel by channel (red, green, blue), and in a
-/// channel texel by texel in the canonical shape's order.
+/// [`Frame::direct`], [`Frame::indirect`] and [`Frame::coefficients`] give signals block by block in the level's order, in
+/// a block channel by channel (red, green, blue), and in a channel texel by texel in the canonical shape's order. They
+/// copy; games read the lightmap, probes or [`Frame::indirect_at`].
 #[derive(Debug)]
 pub struct Frame {
-    lights: Vec<PlacedLight>,
-    direct: Vec<f32>,
-    radiosity: Vec<f32>,
+    config: FrameConfig,
+    layout: Arc<Layout>,
+    /// [`Surface::revision`](crate::scene::Surface) of the scene that the buffers hold the light of.
+    revision: u64,
+    lights: DirectStage,
+    direct: Planes,
+    indirect: Planes,
     coefficients: Vec<f32>,
     joint: Vec<f32>,
     doors: Vec<f32>,
-    indirect: Vec<f32>,
-    previous: Vec<f32>,
+    gate_values: Vec<f32>,
+    blocks: Blocks,
+    scratch: Vec<Scratch>,
     lightmap: Vec<[f32; 3]>,
+    atlas_size: usize,
     probes: Option<Probes>,
     vector: Vec<f32>,
     times: StageTimes,
@@ -145,30 +212,58 @@ pub enum FrameError {
 impl Frame {
     /// Buffers for frames of a scene, all dark, with irradiance and lightmap only.
     pub fn new(scene: &Scene) -> Self {
-        Self::with_outputs(scene, Outputs::default())
+        Self::with_config(scene, FrameConfig::default())
     }
 
     /// Buffers for frames of a scene, all dark, with everything asked for that the dictionary was baked with.
     pub fn with_outputs(scene: &Scene, outputs: Outputs) -> Self {
-        let texels = 3 * scene.texel_count();
+        let config = FrameConfig {
+            outputs,
+            ..FrameConfig::default()
+        };
+        Self::with_config(scene, config)
+    }
+
+    /// Buffers for frames of a scene, all dark.
+    pub fn with_config(scene: &Scene, config: FrameConfig) -> Self {
+        let layout = &scene.layout;
+        let blocks = layout.block_count();
+        let slots = layout.slots.iter().map(|range| range.len()).max();
+        let slots = slots.unwrap_or(0);
+        let coefficients = layout.coefficient_stride.max(layout.joint_stride);
+        let tasks = match config.executor.workers() {
+            0 | 1 => 1,
+            _ => MAX_TASKS,
+        };
+        let outputs = config.outputs;
+        let atlas_size = scene.atlas.width * scene.atlas.height;
         Self {
-            lights: Vec::with_capacity(MAX_LIGHTS),
-            direct: vec![0.0; texels],
-            radiosity: vec![0.0; texels],
-            coefficients: vec![0.0; 3 * scene.coefficient_count],
-            joint: vec![0.0; 3 * scene.joint_count],
+            layout: layout.clone(),
+            revision: 0,
+            lights: DirectStage::new(scene, tasks, slots),
+            direct: Planes::new(layout.slot_count()),
+            indirect: Planes::new(layout.slot_count()),
+            coefficients: vec![0.0; 3 * layout.coefficient_stride * blocks],
+            joint: vec![0.0; 3 * layout.joint_stride * blocks],
             doors: scene.doors.clone(),
-            indirect: vec![0.0; texels],
-            previous: vec![0.0; texels],
-            lightmap: vec![[0.0; 3]; scene.atlas.width * scene.atlas.height],
+            gate_values: vec![0.0; scene.transport.gates.len()],
+            blocks: Blocks::new(blocks, scene.atlas.tile_list_size()),
+            scratch: vec![Scratch::new(slots, coefficients); tasks],
+            lightmap: if outputs.lightmap {
+                vec![[0.0; 3]; atlas_size]
+            } else {
+                Vec::new()
+            },
+            atlas_size,
             probes: outputs.probes.and_then(|order| Probes::new(scene, order)),
             vector: if outputs.vector && scene.has_vector() {
-                vec![0.0; 4 * texels]
+                vec![0.0; 12 * scene.texel_count()]
             } else {
                 Vec::new()
             },
             times: StageTimes::default(),
             passes: 0,
+            config,
         }
     }
 
@@ -185,13 +280,8 @@ impl Frame {
     ) -> Result<(), FrameError> {
         self.check(scene, lights)?;
         let start = Instant::now();
-        direct_light(
-            scene,
-            &self.lights,
-            &self.doors,
-            visibility,
-            &mut self.direct,
-        );
+        self.begin(scene);
+        self.update_direct(scene, visibility, bounces);
         self.times = StageTimes {
             direct: start.elapsed(),
             ..StageTimes::default()
@@ -215,52 +305,121 @@ impl Frame {
         let faulty = direct
             .iter()
             .position(|e| !(0.0..=MAX_LIGHT_VALUE).contains(e));
-        if direct.len() != self.direct.len() || faulty.is_some() {
+        let expected = 3 * scene.texel_count();
+        if direct.len() != expected || faulty.is_some() {
             return Err(FrameError::Direct {
-                expected: self.direct.len(),
+                expected,
                 found: direct.len(),
                 faulty,
             });
         }
-        self.direct.copy_from_slice(direct);
-        self.times = StageTimes::default();
+        let start = Instant::now();
+        self.begin(scene);
+        self.take_direct(scene, direct);
+        self.times = StageTimes {
+            direct: start.elapsed(),
+            ..StageTimes::default()
+        };
         self.bounce(scene, bounces);
         self.fill_outputs(scene);
         Ok(())
     }
 
-    fn fill_outputs(&mut self, scene: &Scene) {
-        let start = Instant::now();
-        scene
-            .atlas
-            .fill(&scene.blocks, &self.indirect, &mut self.lightmap);
-        let after_atlas = Instant::now();
+    /// Forgets everything if the scene is not the one of the frame before, or has changed.
+    fn begin(&mut self, scene: &Scene) {
+        if self.revision == scene.surface.revision {
+            return;
+        }
+        self.revision = scene.surface.revision;
+        self.layout = scene.layout.clone();
+        self.direct.clear();
+        self.indirect.clear();
+        self.coefficients.fill(0.0);
+        self.joint.fill(0.0);
+        self.lightmap.fill([0.0; 3]);
+        self.vector.fill(0.0);
         if let Some(probes) = &mut self.probes {
-            probes.fill(scene, &self.joint);
+            probes.restart(scene);
+        }
+        self.lights.restart(scene);
+        self.blocks.restart(&scene.surface.emitting);
+    }
+
+    fn fill_outputs(&mut self, scene: &Scene) {
+        let (level, executor) = (self.config.simd, &*self.config.executor);
+        self.blocks.changed.sort_unstable();
+        let changed = &self.blocks.changed;
+        let start = Instant::now();
+        if self.config.outputs.lightmap {
+            scene.atlas.fill(
+                changed,
+                &mut self.blocks.tiles,
+                &self.indirect,
+                &mut self.lightmap,
+                executor,
+            );
+        }
+        let after_atlas = Instant::now();
+        let joint = |place: usize| {
+            let size = 3 * self.layout.joint_stride;
+            &self.joint[place * size..(place + 1) * size]
+        };
+        if let Some(probes) = &mut self.probes {
+            for &place in changed {
+                let place = place as usize;
+                let scratch = &mut self.scratch[0];
+                probes.fill(scene, place, level, joint(place), scratch);
+            }
         }
         let after_probes = Instant::now();
         if !self.vector.is_empty() {
-            vector_from_joint(scene, &self.joint, &mut self.vector);
+            for &place in changed {
+                let place = place as usize;
+                let block = &scene.blocks[self.layout.order[place] as usize];
+                let out = &mut self.vector[12 * block.texels.start..12 * block.texels.end];
+                let (red, rest) = out.split_at_mut(4 * block.texels.len());
+                let (green, blue) = rest.split_at_mut(4 * block.texels.len());
+                let basis = &scene.shapes[block.shape_index].vector;
+                level.run(Expand {
+                    basis,
+                    rows: basis.rows,
+                    joint: joint(place),
+                    scratch: &mut self.scratch[0],
+                    out: [red, green, blue],
+                });
+            }
         }
         self.times.atlas = after_atlas - start;
         self.times.probes = after_probes - after_atlas;
         self.times.vector = after_probes.elapsed();
+        self.blocks.clear_changed();
     }
 
     fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
         // Doors and shapes may differ where the number of texels does not.
         let pixels = scene.atlas.width * scene.atlas.height;
         for (what, expected, found) in [
-            ("texels", self.direct.len() / 3, scene.texel_count()),
+            ("texels", self.layout.texel_count(), scene.texel_count()),
+            ("blocks", self.layout.block_count(), scene.blocks.len()),
+            (
+                "texel slots",
+                self.direct.slots(),
+                scene.layout.slot_count(),
+            ),
             (
                 "coefficients",
                 self.coefficients.len() / 3,
-                scene.coefficient_count,
+                scene.layout.coefficient_stride * scene.blocks.len(),
             ),
             (
                 "joint coefficients",
                 self.joint.len() / 3,
-                scene.joint_count,
+                scene.layout.joint_stride * scene.blocks.len(),
+            ),
+            (
+                "sets of doors that light passes",
+                self.gate_values.len(),
+                scene.transport.gates.len(),
             ),
             ("doors", self.doors.len(), scene.doors.len()),
             (
@@ -282,7 +441,7 @@ impl Frame {
                     scene.texel_count()
                 },
             ),
-            ("lightmap pixels", self.lightmap.len(), pixels),
+            ("lightmap pixels", self.atlas_size, pixels),
         ] {
             if found != expected {
                 return Err(FrameError::OtherScene {
@@ -302,63 +461,11 @@ impl Frame {
                 found: lights.len(),
             });
         }
-        // Read by this frame only, so a refused light may leave them incomplete.
-        self.lights.clear();
+        self.lights.next.clear();
         for (index, &light) in lights.iter().enumerate() {
-            self.lights.push(place(scene, index, light)?);
+            self.lights.next.push(place(scene, index, light)?);
         }
         Ok(())
-    }
-
-    fn bounce(&mut self, scene: &Scene, bounces: Bounces) {
-        let (limit, tolerance) = match bounces {
-            Bounces::Count(count) => (count.min(MAX_PASSES), None),
-            Bounces::Feedback => (1, None),
-            Bounces::Converged { tolerance, limit } => (limit.min(MAX_PASSES), Some(tolerance)),
-        };
-        if bounces != Bounces::Feedback {
-            self.indirect.fill(0.0);
-            self.coefficients.fill(0.0);
-            self.joint.fill(0.0);
-        }
-        self.passes = 0;
-        while self.passes < limit {
-            if tolerance.is_some() {
-                self.previous.copy_from_slice(&self.indirect);
-            }
-            self.pass(scene);
-            self.passes += 1;
-            if tolerance.is_some_and(|t| largest_change(&self.previous, &self.indirect) <= t) {
-                break;
-            }
-        }
-    }
-
-    /// One bounce of everything that the walls reflect now.
-    fn pass(&mut self, scene: &Scene) {
-        let start = Instant::now();
-        reflect(scene, &self.direct, &self.indirect, &mut self.radiosity);
-        coefficients_from_radiosity(scene, &self.radiosity, &mut self.coefficients);
-        let after_coefficients = Instant::now();
-        scene
-            .transport
-            .multiply(&self.coefficients, &self.doors, &mut self.joint);
-        add_own(scene, &self.coefficients, &mut self.joint);
-        let after_responses = Instant::now();
-        indirect_from_joint(scene, &self.joint, &mut self.indirect);
-        // Truncated bases leave small negative values; they end here, once, on the final sum.
-        self.indirect.iter_mut().for_each(|e| *e = e.max(0.0));
-        limit_flux(
-            scene,
-            &self.direct,
-            &self.radiosity,
-            &mut self.indirect,
-            &mut self.joint,
-        );
-        let end = Instant::now();
-        self.times.coefficients += after_coefficients - start;
-        self.times.responses += after_responses - after_coefficients;
-        self.times.indirect += end - after_responses;
     }
 
     /// Opens or closes a door for direct and indirect light ([`Rays`](crate::visibility::Rays) ask the caller's function
@@ -371,6 +478,7 @@ impl Frame {
         let count = self.doors.len();
         match self.doors.get_mut(door) {
             Some(place) if (0.0..=1.0).contains(&value) => {
+                self.blocks.doors_moved |= *place != value;
                 *place = value;
                 Ok(())
             }
@@ -388,13 +496,13 @@ impl Frame {
     }
 
     /// Direct irradiance, W/m².
-    pub fn direct(&self) -> &[f32] {
-        &self.direct
+    pub fn direct(&self) -> Vec<f32> {
+        self.layout.by_texel(&self.direct)
     }
 
     /// Indirect irradiance, W/m², not multiplied by the receiving texel's albedo.
-    pub fn indirect(&self) -> &[f32] {
-        &self.indirect
+    pub fn indirect(&self) -> Vec<f32> {
+        self.layout.by_texel(&self.indirect)
     }
 
     /// Indirect irradiance, RGB, of one texel of a block; the scene must be the one that was solved.
@@ -404,16 +512,24 @@ impl Frame {
     pub fn indirect_at(&self, scene: &Scene, block: usize, texel: usize) -> [f32; 3] {
         let range = &scene.blocks[block].texels;
         assert!(texel < range.len(), "texel {texel} of {}", range.len());
-        let start = 3 * range.start + texel;
-        std::array::from_fn(|channel| self.indirect[start + channel * range.len()])
+        self.indirect.get(scene.slot_in(block, texel)).to_array()
     }
 
     /// Coefficients b: block by block, channel by channel.
-    pub fn coefficients(&self) -> &[f32] {
-        &self.coefficients
+    pub fn coefficients(&self) -> Vec<f32> {
+        let stride = self.layout.coefficient_stride;
+        let mut out = Vec::new();
+        for &place in &self.layout.rank {
+            let modes = self.layout.modes[place as usize] as usize;
+            for channel in 0..3 {
+                let start = (3 * place as usize + channel) * stride;
+                out.extend_from_slice(&self.coefficients[start..start + modes]);
+            }
+        }
+        out
     }
 
-    /// Padded lightmap of indirect irradiance, row by row; see [`Scene::atlas`].
+    /// Padded lightmap of indirect irradiance, row by row, see [`Scene::atlas`]; empty if not asked for.
     pub fn lightmap(&self) -> &[[f32; 3]] {
         &self.lightmap
     }
@@ -458,143 +574,4 @@ impl Frame {
     pub fn passes(&self) -> u32 {
         self.passes
     }
-}
-
-/// radiosity = albedo (direct + indirect) + emission
-fn reflect(scene: &Scene, direct: &[f32], indirect: &[f32], radiosity: &mut [f32]) {
-    for block in &scene.blocks {
-        let count = block.texels.len();
-        for channel in 0..3 {
-            let start = 3 * block.texels.start + channel * count;
-            for (k, texel) in block.texels.clone().enumerate() {
-                let incident = direct[start + k] + indirect[start + k];
-                radiosity[start + k] = scene.texel_albedo[texel][channel] * incident
-                    + scene.texel_emission[texel][channel];
-            }
-        }
-    }
-}
-
-/// `b = T_d->b l`
-fn coefficients_from_radiosity(scene: &Scene, radiosity: &[f32], coefficients: &mut [f32]) {
-    coefficients.fill(0.0);
-    for block in &scene.blocks {
-        let operator = &scene.shapes[block.shape_index].coefficients_from_direct;
-        let light = &radiosity[3 * block.texels.start..3 * block.texels.end];
-        let out = &mut coefficients[3 * block.coefficients.start..3 * block.coefficients.end];
-        let light = MatrixView::new(block.texels.len(), 3, light);
-        multiply_add(operator.view(), light, out);
-    }
-}
-
-/// A block's own coefficients are the first of its joint ones.
-fn add_own(scene: &Scene, coefficients: &[f32], joint: &mut [f32]) {
-    for block in &scene.blocks {
-        let (own, all) = (block.coefficients.len(), block.joint.len());
-        for channel in 0..3 {
-            let from = 3 * block.coefficients.start + channel * own;
-            let to = 3 * block.joint.start + channel * all;
-            for (sum, &b) in joint[to..to + own]
-                .iter_mut()
-                .zip(&coefficients[from..from + own])
-            {
-                *sum += b;
-            }
-        }
-    }
-}
-
-/// `U_b b + U_r r`, both in the joint basis.
-fn indirect_from_joint(scene: &Scene, joint: &[f32], indirect: &mut [f32]) {
-    indirect.fill(0.0);
-    for block in &scene.blocks {
-        let basis = &scene.shapes[block.shape_index].joint_basis;
-        let c = &joint[3 * block.joint.start..3 * block.joint.end];
-        let c = MatrixView::new(block.joint.len(), 3, c);
-        let out = &mut indirect[3 * block.texels.start..3 * block.texels.end];
-        multiply_add(basis.view(), c, out);
-    }
-}
-
-/// Vector irradiance, in the joint basis.
-fn vector_from_joint(scene: &Scene, joint: &[f32], vector: &mut [f32]) {
-    vector.fill(0.0);
-    for block in &scene.blocks {
-        let basis = &scene.shapes[block.shape_index].vector_basis;
-        let c = &joint[3 * block.joint.start..3 * block.joint.end];
-        let c = MatrixView::new(block.joint.len(), 3, c);
-        let out = &mut vector[12 * block.texels.start..12 * block.texels.end];
-        multiply_add(basis.view(), c, out);
-    }
-}
-
-/// Share by which more may arrive of direct light that left the walls, and of what they emit: irradiance is that at
-/// texel centres, whose mean differs from a wall's where light comes from nearby. At 3² texels that is 0.1 % for even
-/// light, and without it exact operators would be scaled, and lights not add up.
-const SPOT_GAIN: f64 = 0.05;
-
-/// Scales a channel down where more flux would arrive on all walls than left them.
-///
-/// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
-/// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
-/// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
-fn limit_flux(
-    scene: &Scene,
-    direct: &[f32],
-    radiosity: &[f32],
-    indirect: &mut [f32],
-    joint: &mut [f32],
-) {
-    for channel in 0..3 {
-        let (mut sent, mut arrived) = (0.0f64, 0.0f64);
-        for block in &scene.blocks {
-            let start = 3 * block.texels.start + channel * block.texels.len();
-            let range = start..start + block.texels.len();
-            let areas = &scene.shapes[block.shape_index].texel_areas;
-            let texels = block.texels.clone().zip(&direct[range.clone()]);
-            let fresh: f64 = texels
-                .enumerate()
-                .map(|(k, (texel, &e))| {
-                    // Cubes list no areas: theirs are equal.
-                    let area = areas.get(k).copied().unwrap_or(1.0);
-                    let reflected = scene.texel_albedo[texel][channel] * e;
-                    f64::from((reflected + scene.texel_emission[texel][channel]) * area)
-                })
-                .sum();
-            sent += flux(&radiosity[range.clone()], areas) + SPOT_GAIN * fresh;
-            arrived += flux(&indirect[range], areas);
-        }
-        if arrived > sent {
-            let scale = (sent / arrived) as f32;
-            for block in &scene.blocks {
-                let start = 3 * block.texels.start + channel * block.texels.len();
-                for e in &mut indirect[start..start + block.texels.len()] {
-                    *e *= scale;
-                }
-                let start = 3 * block.joint.start + channel * block.joint.len();
-                for c in &mut joint[start..start + block.joint.len()] {
-                    *c *= scale;
-                }
-            }
-        }
-    }
-}
-
-/// Sum by area; no areas stand for areas of 1.
-fn flux(values: &[f32], areas: &[f32]) -> f64 {
-    if areas.is_empty() {
-        return values.iter().map(|&x| f64::from(x)).sum();
-    }
-    let weighted = values.iter().zip(areas);
-    weighted.map(|(&x, &a)| f64::from(x) * f64::from(a)).sum()
-}
-
-/// Largest difference over the largest value.
-fn largest_change(before: &[f32], after: &[f32]) -> f32 {
-    let largest = after.iter().fold(0.0f32, |m, x| m.max(x.abs()));
-    let change = before
-        .iter()
-        .zip(after)
-        .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
-    if largest > 0.0 { change / largest } else { 0.0 }
 }

@@ -100,7 +100,7 @@ pub enum LightError {
 }
 
 /// A light whose values have been checked, and the block that it stands in. Made by [`place`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedLight {
     pub(crate) light: Light,
     /// `None` for directional lights.

@@ -3,11 +3,12 @@
 //! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
 //! walls, so both show the same light. Between probes the light is interpolated, across openings too.
 
+use crate::frame::{Expand, Scratch};
 use crate::scene::{Beyond, Scene};
-use glam::{DVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use mrt_core::cube::Face;
-use mrt_core::matrix::{Matrix, MatrixView, multiply_add};
 use mrt_core::sh;
+use mrt_core::simd::{Kernel, Lanes, SimdLevel};
 
 /// Coefficients of a probe: bands 0 to 2.
 pub const PROBE_COEFFICIENTS: usize = 9;
@@ -31,6 +32,68 @@ impl ProbeOrder {
     }
 }
 
+/// Matrices that turn bands 1 and 2, row by row; band 0 stays.
+type BandRotations = [[f32; 5]; 3 + 5];
+
+fn band_rotations(rotation: &DMat3) -> BandRotations {
+    let bands = sh::rotation_matrices(3, rotation);
+    let mut rows = [[0.0; 5]; 8];
+    for (band, first) in [(1, 0), (2, 3)] {
+        for row in 0..2 * band + 1 {
+            for column in 0..2 * band + 1 {
+                rows[first + row][column] = bands[band][(row, column)] as f32;
+            }
+        }
+    }
+    rows
+}
+
+/// Turns all probes of a block: `to = bands * from`, both channel by channel, in that coefficient by coefficient.
+struct Turn<'a> {
+    bands: &'a BandRotations,
+    coefficients: usize,
+    count: usize,
+    from: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Turn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) {
+        let whole = self.count / L::N * L::N;
+        for channel in 0..3 {
+            let start = channel * self.coefficients * self.count;
+            let from = &self.from[start..start + self.coefficients * self.count];
+            let to = &mut self.to[start..start + self.coefficients * self.count];
+            to[..self.count].copy_from_slice(&from[..self.count]);
+            for row in 1..self.coefficients {
+                let (first, size) = if row < 4 { (1, 3) } else { (4, 5) };
+                let factors = &self.bands[row - 1][..size];
+                let mut probe = 0;
+                while probe < whole {
+                    let mut sum = l.splat(0.0);
+                    for (k, &factor) in factors.iter().enumerate() {
+                        let at = (first + k) * self.count + probe;
+                        sum = l.mul_add(l.splat(factor), l.load(&from[at..at + L::N]), sum);
+                    }
+                    let at = row * self.count + probe;
+                    l.store(&mut to[at..at + L::N], sum);
+                    probe += L::N;
+                }
+                for probe in whole..self.count {
+                    let mut sum = 0.0;
+                    for (k, &factor) in factors.iter().enumerate() {
+                        sum += factor * from[(first + k) * self.count + probe];
+                    }
+                    to[row * self.count + probe] = sum;
+                }
+            }
+        }
+    }
+}
+
 /// The probes of a scene after a frame.
 ///
 /// Storage is block by block; in a block probe by probe, x fastest, then y, then z in the canonical cube at
@@ -40,10 +103,10 @@ pub struct Probes {
     order: ProbeOrder,
     per_axis: usize,
     values: Vec<[f32; 3]>,
-    /// Light of one block in its own axes, channel by channel.
+    /// Light of one block in its own axes, then in the world's: channel by channel, coefficient by coefficient.
     scratch: Vec<f32>,
-    /// To world axes, each band's matrix, by block.
-    rotations: Vec<Vec<Matrix<f64>>>,
+    /// To world axes, by block.
+    rotations: Vec<BandRotations>,
 }
 
 impl Probes {
@@ -54,11 +117,11 @@ impl Probes {
             order,
             per_axis: scene.probes,
             values: vec![[0.0; 3]; scene.blocks.len() * count * order.coefficients()],
-            scratch: vec![0.0; 3 * count * PROBE_COEFFICIENTS],
+            scratch: vec![0.0; 6 * count * order.coefficients()],
             rotations: scene
                 .blocks
                 .iter()
-                .map(|block| sh::rotation_matrices(3, &block.world_from_probe))
+                .map(|block| band_rotations(&block.world_from_probe))
                 .collect(),
         })
     }
@@ -99,30 +162,48 @@ impl Probes {
         }
     }
 
-    /// Expands the joint coefficients of all blocks.
-    pub(crate) fn fill(&mut self, scene: &Scene, joint: &[f32]) {
+    /// Dark, and turned as another scene's blocks are.
+    pub(crate) fn restart(&mut self, scene: &Scene) {
+        self.values.fill([0.0; 3]);
+        for (to, block) in self.rotations.iter_mut().zip(&scene.blocks) {
+            *to = band_rotations(&block.world_from_probe);
+        }
+    }
+
+    /// Expands the joint coefficients of one block, given by its place.
+    pub(crate) fn fill(
+        &mut self,
+        scene: &Scene,
+        place: usize,
+        level: SimdLevel,
+        joint: &[f32],
+        scratch: &mut Scratch,
+    ) {
         let count = self.per_axis * self.per_axis * self.per_axis;
         let kept = self.order.coefficients();
-        for (index, block) in scene.blocks.iter().enumerate() {
-            let basis = &scene.shapes[block.shape_index].probe_basis;
-            let c = &joint[3 * block.joint.start..3 * block.joint.end];
-            self.scratch.fill(0.0);
-            let c = MatrixView::new(block.joint.len(), 3, c);
-            multiply_add(basis.view(), c, &mut self.scratch);
-            let bands = &self.rotations[index];
-            let channel = count * PROBE_COEFFICIENTS;
-            for probe in 0..count {
-                let out = &mut self.values[(index * count + probe) * kept..][..kept];
-                for c in 0..3 {
-                    let start = c * channel + probe * PROBE_COEFFICIENTS;
-                    let mut coefficients = [0.0f64; PROBE_COEFFICIENTS];
-                    for (to, &from) in coefficients.iter_mut().zip(&self.scratch[start..]) {
-                        *to = f64::from(from);
-                    }
-                    sh::rotate(bands, &mut coefficients);
-                    for (to, &from) in out.iter_mut().zip(&coefficients) {
-                        to[c] = from as f32;
-                    }
+        let block = scene.layout.order[place] as usize;
+        let (canonical, turned) = self.scratch.split_at_mut(3 * kept * count);
+        let (red, rest) = canonical.split_at_mut(kept * count);
+        let (green, blue) = rest.split_at_mut(kept * count);
+        level.run(Expand {
+            basis: &scene.shapes[scene.blocks[block].shape_index].probes,
+            rows: kept * count,
+            joint,
+            scratch,
+            out: [red, green, blue],
+        });
+        level.run(Turn {
+            bands: &self.rotations[block],
+            coefficients: kept,
+            count,
+            from: canonical,
+            to: turned,
+        });
+        let out = &mut self.values[block * count * kept..(block + 1) * count * kept];
+        for (probe, out) in out.chunks_exact_mut(kept).enumerate() {
+            for (k, out) in out.iter_mut().enumerate() {
+                for (channel, out) in out.iter_mut().enumerate() {
+                    *out = turned[(channel * kept + k) * count + probe];
                 }
             }
         }

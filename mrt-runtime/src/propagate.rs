@@ -16,10 +16,10 @@ pub(crate) use table::used_paths;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators};
+use crate::packed::{PackedTransport, TransportPacker};
 use crate::path::{Roll, hole_of};
-use crate::scene::{Gate, Scene, Transport};
+use crate::scene::Scene;
 use crate::shape::Aperture;
-use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::{Matrix, multiply, multiply_add};
@@ -29,9 +29,6 @@ use transit::Transits;
 
 /// Responses of one source, summed by where they enter.
 type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
-
-/// A matrix at (row part, column part) of a block-sparse one.
-type Placed = (usize, usize, Matrix<f32>);
 
 /// Where and how light enters a block.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,15 +49,21 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     used_shapes: &[&ShapeOperators<M>],
     config: &AssembleConfig,
     max_bytes: usize,
-) -> Result<Transport, AssembleError> {
+) -> Result<PackedTransport, AssembleError> {
     let transits = Transits::new(scene, dictionary, used_shapes);
     let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
     let covered = match config.coupling {
         Coupling::Table => dictionary.paths.depths(),
         Coupling::Lightfield => [0; 3],
     };
-    let mut gated: BTreeMap<Vec<u32>, Vec<Placed>> = BTreeMap::new();
-    let mut bytes = 0;
+    let layout = &scene.layout;
+    let shape_of_block = layout.shapes.iter().map(|&shape| shape as usize);
+    let mut packer = TransportPacker::new(
+        &scene.shapes,
+        shape_of_block.collect(),
+        config.transport_storage,
+        config.negligible,
+    );
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);
     // Numbers of holes that a path of the scene may have, for the table's depths.
@@ -90,29 +93,18 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
             }
         }
         for (doors, block, joint) in project(scene, used_shapes, arrivals) {
-            bytes += std::mem::size_of_val(joint.data());
+            let place = |block: usize| layout.rank[block] as usize;
+            packer.add(&doors, place(block), place(source), &joint);
+            let bytes = packer.bytes();
             if bytes > max_bytes {
                 return Err(AssembleError::TooLarge {
                     expected: config.max_bytes,
                     found: config.max_bytes - max_bytes + bytes,
                 });
             }
-            gated.entry(doors).or_default().push((block, source, joint));
         }
     }
-    let row_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.joint.len()).collect();
-    let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
-    let steady = gated.remove(&Vec::new()).unwrap_or_default();
-    Ok(Transport {
-        steady: BlockSparse::from_blocks(&row_sizes, &column_sizes, steady),
-        gated: gated
-            .into_iter()
-            .map(|(doors, blocks)| Gate {
-                doors,
-                operator: BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks),
-            })
-            .collect(),
-    })
+    Ok(packer.finish())
 }
 
 /// Adds responses to those that enter at the same place.

@@ -2,14 +2,15 @@
 
 use crate::atlas::AtlasLayout;
 use crate::light::MAX_LIGHT_VALUE;
+use crate::packed::{PackedShape, PackedTransport};
 use crate::shape::{Aperture, Shape};
 use crate::wall::UnitFromWorld;
 use glam::{DMat3, DVec3, Vec3};
-use mrt_core::block_sparse::BlockSparse;
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
-use mrt_core::matrix::Matrix;
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// A level ready for frames. Made by [`assemble`](crate::assemble::assemble).
 ///
@@ -21,22 +22,14 @@ pub struct Scene {
     pub resolution: usize,
     /// In the order of the level's blocks.
     pub blocks: Vec<SceneBlock>,
-    /// Operators of each shape that the level uses.
-    pub shapes: Vec<SceneShape>,
-    /// World positions of all texels, metres, block by block.
-    pub texel_positions: Vec<Vec3>,
-    /// Unit normals into the blocks.
-    pub texel_normals: Vec<Vec3>,
-    /// Linear RGB albedo of all texels; [`Scene::set_texel_albedo`] changes it.
-    pub texel_albedo: Vec<Vec3>,
-    /// Radiosity that texels emit of themselves, linear RGB, W/m².
-    pub texel_emission: Vec<Vec3>,
+    /// Operators of each shape that the level uses, as kernels read them.
+    pub shapes: Vec<PackedShape>,
+    /// Where everything about the blocks is kept in a frame.
+    pub layout: Arc<Layout>,
+    /// Positions, normals and colours of texels, by slot.
+    pub surface: Surface,
     /// `T_b->r`: from the coefficients b of all blocks to the joint coefficients of all blocks.
-    pub transport: Transport,
-    /// Number of coefficients b over all blocks.
-    pub coefficient_count: usize,
-    /// Number of joint coefficients over all blocks.
-    pub joint_count: usize,
+    pub transport: PackedTransport,
     /// Doors in the order of the level's, with the value that each has at first.
     pub doors: Vec<f32>,
     /// Probes along an edge of a block; 0 if the dictionary has none.
@@ -119,51 +112,6 @@ impl Portal {
     }
 }
 
-/// `T_b->r` of a scene, parted by the doors that light passes on its way.
-#[derive(Clone, Debug)]
-pub struct Transport {
-    /// Through openings that nothing closes: row and column parts are blocks.
-    pub steady: BlockSparse<f32>,
-    /// Through doors.
-    pub gated: Vec<Gate>,
-}
-
-/// What passes exactly these doors.
-#[derive(Clone, Debug)]
-pub struct Gate {
-    /// Indices into [`Scene::doors`], ascending.
-    pub doors: Vec<u32>,
-    /// To be multiplied by the product of the doors' values.
-    pub operator: BlockSparse<f32>,
-}
-
-impl Transport {
-    /// Bytes of all operators.
-    pub fn bytes(&self) -> usize {
-        self.steady.bytes() + self.gated.iter().map(|g| g.operator.bytes()).sum::<usize>()
-    }
-
-    /// Joint coefficients of light from other blocks, three channels, from the coefficients b and the doors'
-    /// values.
-    ///
-    /// # Panics
-    /// If a slice has the wrong length.
-    pub fn multiply(&self, coefficients: &[f32], doors: &[f32], joint: &mut [f32]) {
-        self.steady.multiply(coefficients, 3, joint);
-        for gate in &self.gated {
-            let value: f32 = gate
-                .doors
-                .iter()
-                .map(|&door| doors[door as usize])
-                .product();
-            if value > 0.0 {
-                gate.operator
-                    .multiply_add_scaled(coefficients, 3, value, joint);
-            }
-        }
-    }
-}
-
 /// What lies beyond a face of a block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Beyond {
@@ -223,19 +171,143 @@ pub enum SurfaceError {
     },
 }
 
-/// Operators of a shape that frames use.
+/// How frames keep what they know about blocks: those of one shape one after another, each texel in a slot
+/// ([`Folding`](crate::packed::Folding)), channels apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layout {
+    /// The block of the level at each place.
+    pub order: Vec<u32>,
+    /// The place of each block of the level.
+    pub rank: Vec<u32>,
+    /// By place: its slots.
+    pub slots: Vec<Range<usize>>,
+    /// By place: index into [`Scene::shapes`].
+    pub shapes: Vec<u32>,
+    /// By shape: the slot of each texel, within the block.
+    pub slot_of_texel: Vec<Vec<u32>>,
+    /// Coefficients b that there is place for in every block, a channel.
+    pub coefficient_stride: usize,
+    /// The same of joint coefficients.
+    pub joint_stride: usize,
+    /// By place: number of coefficients b.
+    pub modes: Vec<u32>,
+}
+
+impl Layout {
+    /// Number of blocks.
+    pub fn block_count(&self) -> usize {
+        self.order.len()
+    }
+
+    /// Number of slots.
+    pub fn slot_count(&self) -> usize {
+        self.slots.last().map_or(0, |range| range.end)
+    }
+
+    /// Number of texels.
+    pub fn texel_count(&self) -> usize {
+        let texels = |&shape: &u32| self.slot_of_texel[shape as usize].len();
+        self.shapes.iter().map(texels).sum()
+    }
+
+    /// A signal by slot in the level's order: block by block, channel by channel, in a channel texel by texel.
+    pub(crate) fn by_texel(&self, signal: &Planes) -> Vec<f32> {
+        let mut out = Vec::with_capacity(3 * self.texel_count());
+        for &rank in &self.rank {
+            let rank = rank as usize;
+            let map = &self.slot_of_texel[self.shapes[rank] as usize];
+            for channel in signal.block(self.slots[rank].clone()) {
+                out.extend(map.iter().map(|&slot| channel[slot as usize]));
+            }
+        }
+        out
+    }
+}
+
+/// Three numbers a slot, channels apart.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Planes {
+    values: Vec<f32>,
+    slots: usize,
+}
+
+impl Planes {
+    /// Zeros.
+    pub(crate) fn new(slots: usize) -> Self {
+        Self {
+            values: vec![0.0; 3 * slots],
+            slots,
+        }
+    }
+
+    /// Number of slots.
+    pub fn slots(&self) -> usize {
+        self.slots
+    }
+
+    /// All three channels.
+    pub(crate) fn channels(&self) -> [&[f32]; 3] {
+        self.block(0..self.slots)
+    }
+
+    /// The three channels of a block.
+    pub fn block(&self, slots: Range<usize>) -> [&[f32]; 3] {
+        std::array::from_fn(|c| &self.values[c * self.slots..(c + 1) * self.slots][slots.clone()])
+    }
+
+    /// Zeros everywhere.
+    pub(crate) fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// All three channels, to write.
+    pub(crate) fn channels_mut(&mut self) -> [&mut [f32]; 3] {
+        let (first, rest) = self.values.split_at_mut(self.slots);
+        let (second, third) = rest.split_at_mut(self.slots);
+        [first, second, third]
+    }
+
+    pub(crate) fn block_mut(&mut self, slots: Range<usize>) -> [&mut [f32]; 3] {
+        self.channels_mut()
+            .map(|channel| &mut channel[slots.clone()])
+    }
+
+    pub(crate) fn get(&self, slot: usize) -> Vec3 {
+        Vec3::from_array(std::array::from_fn(|c| self.values[c * self.slots + slot]))
+    }
+
+    pub(crate) fn set(&mut self, slot: usize, value: Vec3) {
+        for (c, x) in value.to_array().into_iter().enumerate() {
+            self.values[c * self.slots + slot] = x;
+        }
+    }
+}
+
+/// What a scene's texels are, by slot; [`Scene::set_texel_albedo`] and [`Scene::set_texel_emission`] change it.
+///
+/// Slots without a texel have no normal and no colour.
 #[derive(Clone, Debug)]
-pub struct SceneShape {
-    /// `T_d->b`, modes x texels.
-    pub coefficients_from_direct: Matrix<f32>,
-    /// Texels x joint modes: irradiance from joint coefficients.
-    pub joint_basis: Matrix<f32>,
-    /// 9 probes³ x joint modes: SH coefficients of probes.
-    pub probe_basis: Matrix<f32>,
-    /// 4 texels x joint modes: vector irradiance, or no rows.
-    pub vector_basis: Matrix<f32>,
-    /// Area of each texel over that of a cube's; empty for cubes.
-    pub texel_areas: Vec<f32>,
+pub struct Surface {
+    /// World positions, metres.
+    pub(crate) positions: Planes,
+    /// Unit normals into the blocks.
+    pub(crate) normals: Planes,
+    /// Linear RGB albedo.
+    pub(crate) albedo: Planes,
+    /// Radiosity that texels emit of themselves, linear RGB, W/m².
+    pub(crate) emission: Planes,
+    /// Places of blocks some texel of which emits, ascending.
+    pub(crate) emitting: Vec<u32>,
+    /// Another for every scene and every change of one.
+    pub(crate) revision: u64,
+}
+
+impl Surface {
+    /// A number that no other scene, and no other state of this one, has.
+    pub(crate) fn next_revision() -> u64 {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        NEXT.fetch_add(1, Ordering::Relaxed)
+    }
 }
 
 impl SceneBlock {
@@ -257,17 +329,8 @@ impl Scene {
     /// [`SurfaceError`], if there is no such block, not as many values as texels, or one outside [0, 1]; the scene
     /// is then as it was.
     pub fn set_texel_albedo(&mut self, block: usize, albedo: &[Vec3]) -> Result<(), SurfaceError> {
-        let range = self.check_surface(block, albedo, "albedo", 1.0)?;
-        let in_holes = self.in_holes(block);
-        for ((to, &from), is_in_hole) in self.texel_albedo[range]
-            .iter_mut()
-            .zip(albedo)
-            .zip(in_holes)
-        {
-            if !is_in_hole {
-                *to = from;
-            }
-        }
+        self.check_surface(block, albedo, "albedo", 1.0)?;
+        self.write_surface(block, albedo, |surface| &mut surface.albedo);
         Ok(())
     }
 
@@ -280,18 +343,45 @@ impl Scene {
         block: usize,
         emission: &[Vec3],
     ) -> Result<(), SurfaceError> {
-        let range = self.check_surface(block, emission, "emission", MAX_LIGHT_VALUE)?;
-        let in_holes = self.in_holes(block);
-        for ((to, &from), is_in_hole) in self.texel_emission[range]
-            .iter_mut()
-            .zip(emission)
-            .zip(in_holes)
-        {
-            if !is_in_hole {
-                *to = from;
+        self.check_surface(block, emission, "emission", MAX_LIGHT_VALUE)?;
+        self.write_surface(block, emission, |surface| &mut surface.emission);
+        let rank = self.layout.rank[block];
+        let emits = emission.iter().any(|e| *e != Vec3::ZERO);
+        let emitting = &mut self.surface.emitting;
+        match (emitting.binary_search(&rank), emits) {
+            (Err(at), true) => emitting.insert(at, rank),
+            (Ok(at), false) => {
+                emitting.remove(at);
             }
+            _ => {}
         }
         Ok(())
+    }
+
+    /// Writes colours of the texels that are not in holes.
+    fn write_surface(
+        &mut self,
+        block: usize,
+        values: &[Vec3],
+        plane: impl Fn(&mut Surface) -> &mut Planes,
+    ) {
+        let shape = self.blocks[block].shape;
+        let rank = self.layout.rank[block] as usize;
+        let start = self.layout.slots[rank].start;
+        let texels = &self.shapes[self.blocks[block].shape_index]
+            .folding
+            .texel_of_slot;
+        let in_hole: Vec<bool> = shape
+            .texels(self.resolution)
+            .map(|(face, center)| shape.is_in_hole(face, center))
+            .collect();
+        for (slot, &texel) in texels.iter().enumerate() {
+            let texel = texel as usize;
+            if in_hole.get(texel) == Some(&false) {
+                plane(&mut self.surface).set(start + slot, values[texel]);
+            }
+        }
+        self.surface.revision = Surface::next_revision();
     }
 
     fn check_surface(
@@ -300,7 +390,7 @@ impl Scene {
         values: &[Vec3],
         what: &'static str,
         largest: f32,
-    ) -> Result<Range<usize>, SurfaceError> {
+    ) -> Result<(), SurfaceError> {
         let placed = self.blocks.get(block).ok_or(SurfaceError::Block {
             found: block,
             expected: self.blocks.len(),
@@ -322,29 +412,64 @@ impl Scene {
                 largest,
                 found: values[texel],
             }),
-            None => Ok(placed.texels.clone()),
+            None => Ok(()),
         }
-    }
-
-    /// For each texel of a block whether it is in a hole.
-    fn in_holes(&self, block: usize) -> impl Iterator<Item = bool> + use<> {
-        let shape = self.blocks[block].shape;
-        shape
-            .texels(self.resolution)
-            .map(move |(face, center)| shape.is_in_hole(face, center))
     }
 
     /// True if every shape has vector irradiance.
     pub fn has_vector(&self) -> bool {
         self.blocks.iter().all(|block| {
-            let rows = self.shapes[block.shape_index].vector_basis.rows();
+            let rows = self.shapes[block.shape_index].vector.rows;
             rows == 4 * block.texels.len()
         })
     }
 
     /// Number of texels over all blocks.
     pub fn texel_count(&self) -> usize {
-        self.texel_positions.len()
+        self.blocks.last().map_or(0, |block| block.texels.end)
+    }
+
+    /// The slot of a texel, counted over all blocks.
+    ///
+    /// # Panics
+    /// If there is no such texel.
+    pub fn slot(&self, texel: usize) -> usize {
+        let block = self
+            .blocks
+            .partition_point(|block| block.texels.end <= texel);
+        self.slot_in(block, texel - self.blocks[block].texels.start)
+    }
+
+    /// The slot of a texel of a block.
+    pub(crate) fn slot_in(&self, block: usize, texel: usize) -> usize {
+        let start = self.layout.slots[self.layout.rank[block] as usize].start;
+        let map = &self.shapes[self.blocks[block].shape_index]
+            .folding
+            .slot_of_texel;
+        start + map[texel] as usize
+    }
+
+    /// World position of a texel, counted over all blocks, metres.
+    ///
+    /// # Panics
+    /// If there is no such texel; so do the three below.
+    pub fn texel_position(&self, texel: usize) -> Vec3 {
+        self.surface.positions.get(self.slot(texel))
+    }
+
+    /// Its unit normal into the block.
+    pub fn texel_normal(&self, texel: usize) -> Vec3 {
+        self.surface.normals.get(self.slot(texel))
+    }
+
+    /// Its linear RGB albedo.
+    pub fn texel_albedo(&self, texel: usize) -> Vec3 {
+        self.surface.albedo.get(self.slot(texel))
+    }
+
+    /// Radiosity that it emits of itself, linear RGB, W/m².
+    pub fn texel_emission(&self, texel: usize) -> Vec3 {
+        self.surface.emission.get(self.slot(texel))
     }
 
     /// The first block that contains a point, else the first that it lies within `tolerance` (in block
@@ -395,19 +520,7 @@ impl Scene {
 
     /// Bytes of the operators that frames read.
     pub fn operator_bytes(&self) -> usize {
-        let of_shapes: usize = self
-            .shapes
-            .iter()
-            .flat_map(|shape| {
-                [
-                    &shape.coefficients_from_direct,
-                    &shape.joint_basis,
-                    &shape.probe_basis,
-                    &shape.vector_basis,
-                ]
-            })
-            .map(|matrix| std::mem::size_of_val(matrix.data()))
-            .sum();
+        let of_shapes: usize = self.shapes.iter().map(PackedShape::bytes).sum();
         of_shapes + self.transport.bytes()
     }
 }

@@ -28,10 +28,22 @@ pub enum Toward {
 }
 
 /// Decides what part of a light reaches a point.
-pub trait Visibility {
+pub trait Visibility: Sync {
     /// Fraction in [0, 1] of the light that arrives, with the value of each of [`Scene::doors`]; what is more
     /// counts as 1, NaN as 0.
     fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32;
+
+    /// Another number whenever answers may differ from those before: with the same one, frames keep what they know.
+    /// `None`, the default, makes them ask for every block in every frame.
+    fn version(&self) -> Option<u64> {
+        None
+    }
+
+    /// True for [`Openings`], whose answers frames get faster without asking.
+    #[doc(hidden)]
+    fn is_by_openings(&self) -> bool {
+        false
+    }
 }
 
 /// Light goes where the level's openings let it.
@@ -41,6 +53,14 @@ pub struct Openings;
 impl Visibility for Openings {
     fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
         through_openings(scene, doors, receiver, toward)
+    }
+
+    fn version(&self) -> Option<u64> {
+        Some(0)
+    }
+
+    fn is_by_openings(&self) -> bool {
+        true
     }
 }
 
@@ -55,13 +75,33 @@ pub struct Rays<F>(pub F);
 /// Distance, metres, at which [`Rays`] puts lights at infinity.
 pub const RAY_REACH: f64 = 1e6;
 
-impl<F: Fn(DVec3, DVec3) -> f32> Visibility for Rays<F> {
+impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
     fn fraction(&self, _: &Scene, _: &[f32], receiver: Receiver, toward: Toward) -> f32 {
         let target = match toward {
             Toward::Point { position, .. } => position,
             Toward::Infinity(direction) => receiver.position + direction * RAY_REACH,
         };
         (self.0)(receiver.position, target)
+    }
+}
+
+/// [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that moves now and then.
+/// With [`FrameConfig::slice`](crate::frame::FrameConfig), the rays of a change are spread over frames.
+#[derive(Clone, Copy, Debug)]
+pub struct Versioned<V> {
+    /// Who is asked.
+    pub visibility: V,
+    /// To be changed whenever answers may change.
+    pub version: u64,
+}
+
+impl<V: Visibility> Visibility for Versioned<V> {
+    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
+        self.visibility.fraction(scene, doors, receiver, toward)
+    }
+
+    fn version(&self) -> Option<u64> {
+        Some(self.version)
     }
 }
 

@@ -66,9 +66,9 @@ fn bounces_between_nearly_white_walls_converge_below_the_bound_of_energy() {
         assert!(frame.passes() < MAX_PASSES, "{name}: {}", frame.passes());
         let mut share = 0.0f64;
         for channel in 0..3 {
-            let sent = flux(&scene, frame.direct(), channel) * albedo;
+            let sent = flux(&scene, &frame.direct(), channel) * albedo;
             let bound = sent * (1.0 + SPOT_GAIN) / (1.0 - albedo);
-            share = share.max(flux(&scene, frame.indirect(), channel) / bound);
+            share = share.max(flux(&scene, &frame.indirect(), channel) / bound);
         }
         println!("{name}: {} passes, {share:.4} of the bound", frame.passes());
         assert!(share <= 1.0 + FLUX_ROUNDING, "{name}: {share}");
@@ -86,7 +86,7 @@ fn every_bounce_adds_light_and_never_more_than_the_one_before() {
             frame
                 .solve(&scene, &[lamp()], &Openings, Bounces::Feedback)
                 .expect("a sound light");
-            let now = flux(&scene, frame.indirect(), 0);
+            let now = flux(&scene, &frame.indirect(), 0);
             let added = now - before;
             let rounding = FLUX_ROUNDING * now;
             assert!(added >= -rounding, "{name}, pass {pass}: {added} of {now}");
@@ -115,9 +115,9 @@ fn walls_that_lose_nothing_gain_nothing_either() {
             let frame = solved(&scene, &[lamp()], bounces);
             for channel in 0..3 {
                 // No bounce brings more than the direct light.
-                let direct = flux(&scene, frame.direct(), channel) * (1.0 + SPOT_GAIN);
+                let direct = flux(&scene, &frame.direct(), channel) * (1.0 + SPOT_GAIN);
                 let bound = f64::from(frame.passes()) * direct;
-                let found = flux(&scene, frame.indirect(), channel);
+                let found = flux(&scene, &frame.indirect(), channel);
                 println!(
                     "{} cells, {name}, channel {channel}: {:.4}",
                     cells.len(),

@@ -64,9 +64,9 @@ fn what_is_behind_a_closed_door_reads_exactly_zero() {
         for bounces in [Bounces::Count(1), CONVERGED] {
             let frame = solved(&scene, &[lamp(Vec3::new(1.9, 0.5, 0.5))], bounces);
             for signal in [frame.direct(), frame.indirect()] {
-                let behind = in_blocks(&scene, signal, 2..4);
+                let behind = in_blocks(&scene, &signal, 2..4);
                 assert!(behind.iter().all(|e| *e == [0.0; 3]), "{coupling:?}");
-                let before = in_blocks(&scene, signal, 0..2);
+                let before = in_blocks(&scene, &signal, 0..2);
                 assert!(before.as_flattened().iter().sum::<f32>() > 0.0);
             }
         }
@@ -97,10 +97,10 @@ fn an_open_door_is_none_and_a_closed_one_is_no_connection() {
                 let expected = solved(&scene, &[light], TEN);
                 let scene = assembled(&with_door(plain.clone(), connection, value), coupling);
                 let found = solved(&scene, &[light], TEN);
-                assert_eq!(found.direct(), expected.direct());
+                assert_eq!(&found.direct(), &expected.direct());
                 let apart = largest_difference(
-                    &by_texel(&scene, found.indirect()),
-                    &by_texel(&scene, expected.indirect()),
+                    &by_texel(&scene, &found.indirect()),
+                    &by_texel(&scene, &expected.indirect()),
                 );
                 println!("plan {k}, {coupling:?}, door at {value}: {apart:.1e}");
                 assert!(apart < ROUNDING, "plan {k}, {coupling:?}, {value}: {apart}");
@@ -128,7 +128,7 @@ fn light_that_crosses_doors_is_multiplied_by_their_values() {
                 .solve_from_direct(&scene, &direct, Bounces::Count(1))
                 .expect("light of the right length");
             (0..4)
-                .map(|block| in_blocks(&scene, frame.indirect(), block..block + 1))
+                .map(|block| in_blocks(&scene, &frame.indirect(), block..block + 1))
                 .collect::<Vec<_>>()
         };
         let open = solve([1.0, 1.0]);
@@ -167,7 +167,7 @@ fn opening_a_door_never_takes_light_from_behind_it() {
         frame
             .solve(&scene, &[light], &Openings, TEN)
             .expect("a sound light");
-        let behind = in_blocks(&scene, frame.indirect(), 2..4);
+        let behind = in_blocks(&scene, &frame.indirect(), 2..4);
         let sum: f32 = behind.as_flattened().iter().sum();
         assert!(step == 0 || sum > before, "{step}: {sum}, {before} before");
         before = sum;

@@ -32,7 +32,7 @@ fn a_panel_lights_its_own_block_and_the_others() {
     let scene = assembled(&panelled(0.5));
     let frame = solved(&scene, &[], Bounces::Count(1));
     assert!(frame.direct().iter().all(|&e| e == 0.0));
-    let light = by_texel(&scene, frame.indirect());
+    let light = by_texel(&scene, &frame.indirect());
     for (index, block) in scene.blocks.iter().enumerate() {
         let sum: f32 = light[block.texels.clone()].iter().map(|e| e[0]).sum();
         assert!(sum > 0.0, "block {index}");
@@ -63,10 +63,10 @@ fn a_panel_is_the_direct_light_that_its_wall_would_reflect() {
             frame
                 .solve_from_direct(&dark, &direct, bounces)
                 .expect("light of the right length");
-            by_texel(&dark, frame.indirect())
+            by_texel(&dark, &frame.indirect())
         };
         let found = solved(&shining, &[], bounces);
-        let apart = largest_difference(&by_texel(&shining, found.indirect()), &expected);
+        let apart = largest_difference(&by_texel(&shining, &found.indirect()), &expected);
         assert!(apart < ROUNDING, "{bounces:?}: {apart}");
     }
 }
@@ -77,7 +77,7 @@ fn a_panel_shines_as_exact_form_factors_say() {
     let level = panelled(0.0);
     let scene = assembled(&level);
     let frame = solved(&scene, &[], CONVERGED);
-    let found = in_level_order(&level, &scene, frame.indirect());
+    let found = in_level_order(&level, &scene, &frame.indirect());
     let exact = exact_of(&level, scene.resolution);
     let transport = Transport::build(&exact);
     let radiosity: Vec<[f64; 4]> = exact

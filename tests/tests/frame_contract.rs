@@ -48,7 +48,7 @@ const GOOD_DIRECTIONAL: Light = Light::Directional {
 /// Everything that a frame shows, bit by bit.
 fn snapshot(frame: &Frame) -> Vec<u32> {
     let signals = [frame.direct(), frame.indirect(), frame.coefficients()];
-    let lightmap = frame.lightmap().as_flattened();
+    let lightmap = frame.lightmap().as_flattened().to_vec();
     let all = signals.into_iter().chain([lightmap]).flatten();
     all.map(|x| x.to_bits()).chain([frame.passes()]).collect()
 }
@@ -227,7 +227,7 @@ fn extreme_but_legal_lights_give_finite_light() {
             for position in [
                 Vec3::splat(0.5),
                 Vec3::ZERO,
-                scene.texel_positions[17],
+                scene.texel_position(17),
                 Vec3::new(1.0, 0.5, 0.5),
             ] {
                 lights.push(sphere(position, radius, Vec3::splat(intensity)));
@@ -291,9 +291,9 @@ fn without_lights_everything_is_zero() {
         let all = [
             frame.direct(),
             frame.indirect(),
-            frame.lightmap().as_flattened(),
+            frame.lightmap().as_flattened().to_vec(),
         ];
-        assert!(all.into_iter().flatten().all(|&e| e == 0.0), "{bounces:?}");
+        assert!(all.into_iter().flatten().all(|e| e == 0.0), "{bounces:?}");
     }
 }
 
@@ -318,12 +318,12 @@ fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
         Bounces::Count(1),
     );
     let (spot, sphere) = (
-        by_texel(&scene, spot.direct()),
-        by_texel(&scene, sphere.direct()),
+        by_texel(&scene, &spot.direct()),
+        by_texel(&scene, &sphere.direct()),
     );
     let mut seen = [0; 3];
     for texel in 0..scene.texel_count() {
-        let angle = (scene.texel_positions[texel] - position).angle_between(direction);
+        let angle = (scene.texel_position(texel) - position).angle_between(direction);
         // `angle_between` here is `f32`: off by up to 1e-3 for small angles.
         if angle < inner_angle - 1e-3 {
             assert_eq!(spot[texel], sphere[texel]);
@@ -347,13 +347,13 @@ fn directional_light_enters_through_outside_openings_only() {
         frame
             .direct()
             .iter()
-            .chain(frame.indirect())
+            .chain(&frame.indirect())
             .all(|&e| e == 0.0)
     );
 
     let open = assembled(&level_with_a_door_outside());
     let frame = solved(&open, &[GOOD_DIRECTIONAL], Bounces::Count(1));
-    let direct = by_texel(&open, frame.direct());
+    let direct = by_texel(&open, &frame.direct());
     let flux = direct.iter().map(|e| f64::from(e[0])).sum::<f64>() / 256.0;
     let direction = DVec3::new(-1.0, -0.3, 0.2).normalize();
     // What passes the unit opening in the plane x = 2, all of which ends on walls of blocks 0, 1 and 3.
@@ -373,8 +373,8 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
     const RIM: f64 = 1e-6;
     for block in [0, 1] {
         for texel in scene.blocks[block].texels.clone() {
-            let position = scene.texel_positions[texel].as_dvec3();
-            let normal = scene.texel_normals[texel].as_dvec3();
+            let position = scene.texel_position(texel).as_dvec3();
+            let normal = scene.texel_normal(texel).as_dvec3();
             let distance = (2.0 - position.x) / -direction.x;
             let door = position - direction * distance;
             let depth = door.y.min(1.0 - door.y).min(door.z.min(1.0 - door.z));
@@ -401,7 +401,7 @@ fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
     let scene = assembled(&level);
     let mut frame = Frame::new(&scene);
     let on_texel = Light::Spot {
-        position: scene.texel_positions[0],
+        position: scene.texel_position(0),
         radius: 0.1,
         intensity: Vec3::ONE,
         direction: Vec3::ONE,

@@ -163,11 +163,11 @@ fn rooms_behind_holes_are_as_bright_as_they_should_be() {
         .expect("the level fits the dictionary");
         let lamp = sphere(LAMP.as_vec3(), 0.1, Vec3::ONE);
         let mut frame = solved(&scene, &[lamp], Bounces::Count(0));
-        let direct = only_first_block(&scene, frame.direct());
+        let direct = only_first_block(&scene, &frame.direct());
         frame
             .solve_from_direct(&scene, &direct, Bounces::Count(1))
             .expect("light of the right length");
-        let found = by_texel(&scene, frame.indirect());
+        let found = by_texel(&scene, &frame.indirect());
         let pieces = pieces(hole);
         for (block, bound) in bounds.into_iter().enumerate() {
             let mut ours = Vec::new();
@@ -180,8 +180,8 @@ fn rooms_behind_holes_are_as_bright_as_they_should_be() {
                     assert_eq!(found[texel], [0.0; 3], "what is not there is dark");
                     continue;
                 }
-                let point = scene.texel_positions[texel].as_dvec3();
-                let normal = scene.texel_normals[texel].as_dvec3();
+                let point = scene.texel_position(texel).as_dvec3();
+                let normal = scene.texel_normal(texel).as_dvec3();
                 ours.push(f64::from(found[texel][0]));
                 theirs.push(f64::from(albedo) * truth(hole, &pieces, block, point, normal));
             }
@@ -208,12 +208,12 @@ fn direct_light_falls_through_the_hole_and_nowhere_else() {
             &[sphere(LAMP.as_vec3(), 0.0, Vec3::ONE)],
             Bounces::Count(1),
         );
-        let direct = by_texel(&scene, frame.direct());
+        let direct = by_texel(&scene, &frame.direct());
         let mut lit = 0;
         for block in 1..3 {
             for texel in scene.blocks[block].texels.clone() {
-                let point = scene.texel_positions[texel].as_dvec3();
-                let normal = scene.texel_normals[texel].as_dvec3();
+                let point = scene.texel_position(texel).as_dvec3();
+                let normal = scene.texel_normal(texel).as_dvec3();
                 let faces = normal.dot(LAMP - point) > 1e-6;
                 let expected = faces && passes(hole, LAMP, point);
                 assert_eq!(direct[texel][0] > 0.0, expected, "{hole:?}, {point}");

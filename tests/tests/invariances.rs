@@ -67,14 +67,14 @@ fn two_lights() -> [Light; 2] {
 fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f32; 3]>) {
     let scene = assembled(level);
     let frame = solved(&scene, lights, bounces);
-    let signal = by_texel(&scene, frame.indirect());
+    let signal = by_texel(&scene, &frame.indirect());
     (scene, signal)
 }
 
 /// Place and direction of a texel as whole numbers: texel centres are multiples of 1/32 at 16².
 fn place(scene: &Scene, texel: usize, map: impl Fn(Vec3) -> Vec3) -> [i32; 6] {
-    let position = map(scene.texel_positions[texel]) * 64.0;
-    let normal = map(scene.texel_normals[texel]) - map(Vec3::ZERO);
+    let position = map(scene.texel_position(texel)) * 64.0;
+    let normal = map(scene.texel_normal(texel)) - map(Vec3::ZERO);
     let whole = |v: Vec3| v.round().as_ivec3().to_array();
     let ([a, b, c], [d, e, f]) = (whole(position), whole(normal));
     [a, b, c, d, e, f]
@@ -321,7 +321,7 @@ fn a_mirrored_corridor_has_mirrored_light() {
     let (scene, left) = indirect(&level, &at(1.25), CONVERGED);
     let (other, right) = indirect(&level, &at(4.75), CONVERGED);
     let by_place = |scene: &Scene, texel: usize, mirror: bool| {
-        let (mut p, mut n) = (scene.texel_positions[texel], scene.texel_normals[texel]);
+        let (mut p, mut n) = (scene.texel_position(texel), scene.texel_normal(texel));
         if mirror {
             (p.x, n.x) = (6.0 - p.x, -n.x);
         }

@@ -132,7 +132,7 @@ fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
         };
         let scene = assemble(&level(), &dictionary, &config).expect("it fits");
         let light = sphere(vec3(0.4, 0.7, 0.5), 0.15, Vec3::ONE);
-        solved(&scene, &[light], CONVERGED).indirect().to_vec()
+        solved(&scene, &[light], CONVERGED).indirect()
     };
     assert_eq!(joined(Coupling::Table), joined(Coupling::Lightfield));
 }

@@ -132,7 +132,7 @@ fn first_bounce(
     frame
         .solve_from_direct(scene, &direct, Bounces::Count(1))
         .expect("light of the right length");
-    in_level_order(level, scene, frame.indirect())
+    in_level_order(level, scene, &frame.indirect())
 }
 
 /// A path run backwards, and the symmetry that takes the axes of the path to its.

@@ -38,6 +38,7 @@ fn scene_of(cells: &[[i32; 3]]) -> Scene {
 
 fn lit(scene: &Scene, position: Vec3, order: ProbeOrder) -> Frame {
     let outputs = Outputs {
+        lightmap: true,
         probes: Some(order),
         vector: false,
     };

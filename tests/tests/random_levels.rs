@@ -129,7 +129,7 @@ proptest! {
             let mut sum = [0.0; 3];
             for (texel, e) in by_texel(&scene, signal).into_iter().enumerate() {
                 for (c, sum) in sum.iter_mut().enumerate() {
-                    let albedo = if reflected { scene.texel_albedo[texel][c] } else { 1.0 };
+                    let albedo = if reflected { scene.texel_albedo(texel)[c] } else { 1.0 };
                     *sum += areas[texel] * f64::from(albedo) * f64::from(e[c]);
                 }
             }
@@ -139,16 +139,17 @@ proptest! {
         let single = solved(&scene, &lights, Bounces::Count(1));
         prop_assert!(single.indirect().iter().all(|e| e.is_finite() && *e >= 0.0));
         let mut emitted = [0.0; 3];
-        for (texel, emission) in scene.texel_emission.iter().enumerate() {
+        for texel in 0..scene.texel_count() {
+            let emission = scene.texel_emission(texel);
             for (c, sum) in emitted.iter_mut().enumerate() {
                 *sum += areas[texel] * f64::from(emission[c]);
             }
         }
-        let mut sent = flux(single.direct(), true);
+        let mut sent = flux(&single.direct(), true);
         for c in 0..3 {
             sent[c] += emitted[c];
         }
-        let arrived = flux(single.indirect(), false);
+        let arrived = flux(&single.indirect(), false);
         let mut single_gain = 0.0f64;
         for (sent, arrived) in sent.into_iter().zip(arrived) {
             single_gain = single_gain.max(arrived / sent.max(1e-30));
@@ -162,9 +163,9 @@ proptest! {
         prop_assert!(all.passes() < limit, "still changing after {} passes", all.passes());
         // With a the largest albedo: reflected = a (injected + reflected) at most.
         let a = f64::from(recipe.largest_albedo);
-        let injected = flux(all.direct(), false);
-        let direct = flux(all.direct(), true);
-        let indirect = flux(all.indirect(), true);
+        let injected = flux(&all.direct(), false);
+        let direct = flux(&all.direct(), true);
+        let indirect = flux(&all.indirect(), true);
         let mut share = 0.0f64;
         for c in 0..3 {
             let bound = (injected[c] * a + emitted[c] * a) / (1.0 - a);

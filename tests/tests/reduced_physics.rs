@@ -43,7 +43,7 @@ fn furnace(level: &Level) -> Frame {
 #[test]
 fn a_closed_cube_of_uniform_light_stays_uniform() {
     let frame = furnace(&floor_plan(&corridor(1), 1.0));
-    let (worst, _) = deviation_from_one(frame.indirect());
+    let (worst, _) = deviation_from_one(&frame.indirect());
     println!("closed cube: {worst:.2e}");
     // The bases hold uniform light exactly up to the finite weight that it enters the prior with.
     assert!(worst < 1e-3, "{worst}");
@@ -53,7 +53,7 @@ fn a_closed_cube_of_uniform_light_stays_uniform() {
 fn levels_of_uniform_light_stay_nearly_uniform_and_keep_their_energy() {
     for (name, cells) in closed_floor_plans() {
         let frame = furnace(&floor_plan(&cells, 1.0));
-        let (worst, mean) = deviation_from_one(frame.indirect());
+        let (worst, mean) = deviation_from_one(&frame.indirect());
         println!(
             "furnace, {name}: worst {:.2} %, mean {:+.3} %",
             100.0 * worst,
@@ -84,7 +84,7 @@ fn a_furnace_keeps_its_level_over_all_bounces() {
         frame
             .solve_from_direct(&scene, &direct, CONVERGED)
             .expect("light of the right length");
-        let (worst, mean) = deviation_from_one(frame.indirect());
+        let (worst, mean) = deviation_from_one(&frame.indirect());
         println!(
             "all bounces, {name}: worst {:.2} %, mean {:+.3} %",
             100.0 * worst,
@@ -222,8 +222,8 @@ fn an_unconnected_block_reads_exactly_zero() {
     for bounces in [Bounces::Count(1), CONVERGED] {
         let frame = solved(&scene, &[light], bounces);
         let (direct, indirect) = (
-            by_texel(&scene, frame.direct()),
-            by_texel(&scene, frame.indirect()),
+            by_texel(&scene, &frame.direct()),
+            by_texel(&scene, &frame.indirect()),
         );
         for (index, block) in scene.blocks.iter().enumerate() {
             for texel in block.texels.clone() {
@@ -253,8 +253,8 @@ fn feedback_over_frames_tends_to_all_bounces() {
                 .expect("the light is sound");
         }
         let apart = largest_difference(
-            &in_level_order(&level, &scene, frame.indirect()),
-            &in_level_order(&level, &scene, converged.indirect()),
+            &in_level_order(&level, &scene, &frame.indirect()),
+            &in_level_order(&level, &scene, &converged.indirect()),
         );
         // It comes nearer until rounding is all that is left.
         assert!(apart < before || apart < 1e-5, "round {round}: {apart}");

@@ -79,7 +79,7 @@ fn steps(scene: &Scene, signal: &[f64]) -> Vec<(f64, DVec3)> {
 
 /// The exact first bounce of a frame's direct light, in the order of the scene's texels.
 fn exact_bounce(level: &Level, scene: &Scene, transport: &Transport, frame: &Frame) -> Vec<f64> {
-    let direct = in_level_order(level, scene, frame.direct());
+    let direct = in_level_order(level, scene, &frame.direct());
     let radiosity: Vec<[f64; 4]> = direct
         .iter()
         .map(|e| [f64::from(ALBEDO * e[0]); 4])
@@ -103,7 +103,7 @@ fn exact_bounce(level: &Level, scene: &Scene, transport: &Transport, frame: &Fra
 }
 
 fn red(scene: &Scene, frame: &Frame) -> Vec<f64> {
-    by_texel(scene, frame.indirect())
+    by_texel(scene, &frame.indirect())
         .iter()
         .map(|e| f64::from(e[0]))
         .collect()

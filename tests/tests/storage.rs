@@ -107,7 +107,7 @@ fn lit_to<M: OperatorMatrix>(
             frame
                 .solve(&scene, &lights, &Openings, bounces)
                 .expect("the lights are sound");
-            signals.push(frame.indirect().to_vec());
+            signals.push(frame.indirect());
         }
     }
     signals

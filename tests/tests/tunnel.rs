@@ -197,11 +197,14 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
         radius: 0.1,
     };
     let traced = PathScene::new(&mesh(scene), vec![light], &[]).expect("a sound mesh");
-    let receivers: Vec<(DVec3, DVec3)> = scene
-        .texel_positions
-        .iter()
-        .zip(&scene.texel_normals)
-        .map(|(p, n)| (p.as_dvec3() + n.as_dvec3() * LIFT, n.as_dvec3()))
+    let receivers: Vec<(DVec3, DVec3)> = (0..scene.texel_count())
+        .map(|k| {
+            (
+                scene.texel_position(k).as_dvec3(),
+                scene.texel_normal(k).as_dvec3(),
+            )
+        })
+        .map(|(p, n)| (p + n * LIFT, n))
         .collect();
     [1, 2].map(|seed| {
         let settings = PathSettings {
@@ -292,8 +295,8 @@ fn image_error(level: &Level, image: &Level, map: impl Fn(DVec3) -> DVec3) -> f6
     let (mut miss, mut norm) = (0.0, 0.0);
     for (block, other) in here.blocks.iter().zip(&there.blocks) {
         for texel in block.texels.clone() {
-            let place = map(here.texel_positions[texel].as_dvec3());
-            let distance = |k: &usize| there.texel_positions[*k].as_dvec3().distance(place);
+            let place = map(here.texel_position(texel).as_dvec3());
+            let distance = |k: &usize| there.texel_position(*k).as_dvec3().distance(place);
             let twin = other
                 .texels
                 .clone()
@@ -396,7 +399,7 @@ fn seam(dictionary: &Dictionary) -> f64 {
     // The two texels nearest to an opening in each row, nearest first, with their places.
     let rows = |block: usize, side: Face| -> Vec<(DVec3, [usize; 2])> {
         let placed = &scene.blocks[block];
-        let point = |k: usize| scene.texel_positions[placed.texels.start + k].as_dvec3();
+        let point = |k: usize| scene.texel_position(placed.texels.start + k).as_dvec3();
         let plane = placed.warp.point(side.point(0.5, 0.5));
         let out = (plane - placed.warp.center()).normalize();
         let depth = |k: usize| (plane - point(k)).dot(out);

@@ -88,6 +88,7 @@ fn errors(position: Vec3, tilt: std::ops::Range<usize>) -> f64 {
     let level = Level::from_cells(&[[0, 0, 0]], Vec3::ONE).expect("a cell");
     let scene = assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
     let outputs = Outputs {
+        lightmap: true,
         probes: None,
         vector: true,
     };
@@ -155,6 +156,7 @@ fn vector_irradiance_crosses_openings_and_follows_the_wall() {
     let level = Level::from_cells(&cells, Vec3::ONE).expect("cells");
     let scene = assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
     let outputs = Outputs {
+        lightmap: true,
         probes: None,
         vector: true,
     };

@@ -82,9 +82,9 @@ fn by_place(scene: &Scene, signal: &[[f32; 3]], turn: CubeRotation) -> HashMap<[
     (0..scene.texel_count())
         .map(|texel| {
             let middle = DVec3::splat(0.5);
-            let position = scene.texel_positions[texel].as_dvec3() - middle;
+            let position = scene.texel_position(texel).as_dvec3() - middle;
             let [a, b, c] = whole(turn.direction(position));
-            let [d, e, f] = whole(turn.direction(scene.texel_normals[texel].as_dvec3()));
+            let [d, e, f] = whole(turn.direction(scene.texel_normal(texel).as_dvec3()));
             ([a, b, c, d, e, f], signal[texel])
         })
         .collect()
@@ -110,7 +110,7 @@ fn no_direction_is_special() {
                 let position = turn.direction(lamp - 0.5) + 0.5;
                 let light = sphere(position.as_vec3(), 0.1, Vec3::new(1.0, 2.0, 3.0));
                 let frame = solved(&scene, &[light], Bounces::Count(10));
-                let found = by_place(&scene, &by_texel(&scene, frame.indirect()), turn.inverse());
+                let found = by_place(&scene, &by_texel(&scene, &frame.indirect()), turn.inverse());
                 let Some(expected) = &expected else {
                     expected = Some(found);
                     continue;
@@ -162,7 +162,7 @@ fn a_stack_is_within_the_bounds_of_the_standard_preset() {
             Vec3::splat(reference.intensity as f32),
         );
         let frame = solved(&scene, &[source], Bounces::Count(1));
-        let ours: Vec<f64> = common::in_level_order(&level, &scene, frame.indirect())
+        let ours: Vec<f64> = common::in_level_order(&level, &scene, &frame.indirect())
             .iter()
             .map(|e| f64::from(e[0]))
             .collect();

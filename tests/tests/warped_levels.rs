@@ -127,7 +127,7 @@ fn indirect(level: &Level, direct: &[f64]) -> Vec<f64> {
     frame
         .solve_from_direct(&scene, &frame_direct, Bounces::Count(BOUNCES as u32))
         .expect("sound light");
-    in_level_order(level, &scene, frame.indirect())
+    in_level_order(level, &scene, &frame.indirect())
         .into_iter()
         .map(|rgb| f64::from(rgb[0]))
         .collect()

@@ -114,6 +114,16 @@ impl ColumnLists {
         }
     }
 
+    /// Number of indices in all lists.
+    pub fn len(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.indices.is_empty()
+    }
+
     /// Bytes of the indices.
     pub fn bytes(&self) -> usize {
         size_of_val(self.indices.as_slice())

@@ -302,6 +302,7 @@ pub fn compare(
         })?;
     let is_probes = matches!(reference.kind, Kind::RadianceSh9 { .. });
     let outputs = Outputs {
+        lightmap: true,
         probes: is_probes.then_some(ProbeOrder::L2),
         vector: false,
     };

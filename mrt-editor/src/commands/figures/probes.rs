@@ -34,6 +34,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let level = from_text(MAZE)?;
     let scene = assemble(&level, setting.dictionary, &AssembleConfig::default())?;
     let outputs = Outputs {
+        lightmap: true,
         probes: Some(ProbeOrder::L2),
         vector: false,
     };

@@ -1,0 +1,85 @@
+//! Who runs the parts of a frame: the caller's thread, or threads that the caller lends.
+
+use std::fmt::Debug;
+use std::sync::{Mutex, PoisonError};
+
+/// Runs tasks, at once or one after another.
+pub trait Executor: Debug + Send + Sync {
+    /// Tasks that it runs at once, about.
+    fn workers(&self) -> usize;
+
+    /// Calls `task` with each number below `tasks` once, on any threads in any order, and returns when all are done.
+    fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync));
+}
+
+/// On the caller's thread.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Serial;
+
+impl Executor for Serial {
+    fn workers(&self) -> usize {
+        1
+    }
+
+    fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync)) {
+        (0..tasks).for_each(task);
+    }
+}
+
+/// On the threads of rayon's current pool.
+#[cfg(feature = "rayon")]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rayon;
+
+#[cfg(feature = "rayon")]
+impl Executor for Rayon {
+    fn workers(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
+    fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync)) {
+        use rayon::prelude::*;
+        (0..tasks).into_par_iter().with_max_len(1).for_each(task);
+    }
+}
+
+/// Parts that one stage of a frame is cut into, at most.
+pub(crate) const MAX_TASKS: usize = 64;
+
+/// Parts a worker: enough that one slow part does not keep the others waiting for long.
+const TASKS_PER_WORKER: usize = 4;
+
+/// Number of parts for so many blocks.
+pub(crate) fn task_count(executor: &dyn Executor, blocks: usize) -> usize {
+    match executor.workers() {
+        0 | 1 => 1,
+        workers => (workers * TASKS_PER_WORKER).min(MAX_TASKS),
+    }
+    .min(blocks)
+    .max(1)
+}
+
+/// Calls `f` with each part, which it owns meanwhile; nothing is allocated.
+pub(crate) fn run_parts<T: Send>(
+    executor: &dyn Executor,
+    parts: impl IntoIterator<Item = T>,
+    f: impl Fn(T) + Sync,
+) {
+    let mut parts = parts.into_iter();
+    let mut slots: [Mutex<Option<T>>; MAX_TASKS] = std::array::from_fn(|_| Mutex::new(None));
+    let mut count = 0;
+    for (slot, part) in slots.iter_mut().zip(&mut parts) {
+        *slot = Mutex::new(Some(part));
+        count += 1;
+    }
+    assert!(parts.next().is_none(), "more than {MAX_TASKS} parts");
+    executor.run(count, &|k| {
+        let part = slots[k]
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        if let Some(part) = part {
+            f(part);
+        }
+    });
+}

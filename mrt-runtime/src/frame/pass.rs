@@ -1,0 +1,408 @@
+//! Bounces: which blocks take part, and the two stages of a pass over them.
+
+use super::blocks::{BlockState, Blocks};
+use super::kernels::{CoefficientsOf, IndirectOf, Scratch, Sent};
+use super::limit::limit_flux;
+use super::{Bounces, Frame, MAX_PASSES};
+use crate::executor::{run_parts, task_count};
+use crate::scene::{Planes, Scene};
+use std::time::Instant;
+
+/// What the frame before left behind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(super) enum Kept {
+    /// Nothing to go on from.
+    #[default]
+    Nothing,
+    /// Light of one bounce.
+    Once,
+    /// Light of many, one more each frame.
+    Feedback,
+}
+
+impl Frame {
+    pub(super) fn bounce(&mut self, scene: &Scene, bounces: Bounces) {
+        self.update_gates(scene);
+        self.passes = 0;
+        let kept = match bounces {
+            Bounces::Count(1) => Kept::Once,
+            Bounces::Feedback => Kept::Feedback,
+            _ => Kept::Nothing,
+        };
+        self.blocks.all_stale |= kept != self.blocks.kept || kept == Kept::Nothing;
+        self.blocks.kept = kept;
+        if kept != Kept::Nothing {
+            self.pass(scene, kept == Kept::Feedback, true);
+            self.passes = 1;
+            return;
+        }
+        let (limit, tolerance) = match bounces {
+            Bounces::Count(count) => (count, None),
+            Bounces::Feedback => (1, None),
+            Bounces::Converged { tolerance, limit } => (limit, Some(tolerance)),
+        };
+        if limit == 0 {
+            self.darken();
+        }
+        while self.passes < limit.min(MAX_PASSES) {
+            // The second pass is the first that reflects indirect light, wherever there is some.
+            self.blocks.all_stale |= self.passes == 1;
+            let change = self.pass(scene, self.passes > 0, false);
+            self.passes += 1;
+            if tolerance.is_some_and(|t| change <= t) {
+                break;
+            }
+        }
+    }
+
+    /// Takes all indirect light away.
+    fn darken(&mut self) {
+        self.coefficients.fill(0.0);
+        self.joint.fill(0.0);
+        self.indirect.clear();
+        self.blocks.has_coefficients.fill(false);
+        for k in 0..self.blocks.alive.len() {
+            let block = self.blocks.alive[k];
+            self.blocks.mark_changed(block);
+            let state = &mut self.blocks.state[block as usize];
+            state.has_indirect = false;
+            (state.arrived, state.peak) = ([0.0; 3], 0.0);
+        }
+    }
+
+    /// Products of doors' values.
+    fn update_gates(&mut self, scene: &Scene) {
+        if !std::mem::take(&mut self.blocks.doors_moved) {
+            return;
+        }
+        for (value, doors) in self.gate_values.iter_mut().zip(&scene.transport.gates) {
+            let now = doors
+                .iter()
+                .map(|&door| self.doors[door as usize])
+                .product();
+            self.blocks.all_stale |= *value != now;
+            *value = now;
+        }
+    }
+
+    /// One bounce of what the walls reflect and emit. Returns the largest change of irradiance over the largest
+    /// irradiance; in a pass that starts from darkness that is 1, or 0 without light.
+    fn pass(&mut self, scene: &Scene, reflects_indirect: bool, goes_on: bool) -> f32 {
+        let start = Instant::now();
+        let all = std::mem::take(&mut self.blocks.all_stale);
+        let tolerance = if goes_on { self.config.tolerance } else { 0.0 };
+        let blocks = &mut self.blocks;
+        blocks.alive.sort_unstable();
+        blocks.sources.clear();
+        for &block in &blocks.alive {
+            if all || blocks.state[block as usize].stale > tolerance {
+                blocks.sources.push(block);
+            }
+        }
+        self.update_coefficients(scene, reflects_indirect);
+        let blocks = &mut self.blocks;
+        for k in 0..blocks.sources.len() {
+            let block = blocks.sources[k];
+            let state = &mut blocks.state[block as usize];
+            state.stale = 0.0;
+            let had = std::mem::replace(
+                &mut state.had_coefficients,
+                blocks.has_coefficients[block as usize],
+            );
+            if all || had || state.had_coefficients {
+                blocks.await_light(block);
+                for &reached in scene.transport.reached(block as usize) {
+                    blocks.await_light(reached);
+                }
+            }
+        }
+        let after_coefficients = Instant::now();
+        let count = match self.config.slice {
+            Some(slice) if goes_on => slice.get().min(blocks.waiting.len()),
+            _ => blocks.waiting.len(),
+        };
+        blocks.targets.clear();
+        for block in blocks.waiting.drain(..count) {
+            blocks.state[block as usize].is_waiting = false;
+            blocks.targets.push(block);
+        }
+        blocks.targets.sort_unstable();
+        self.update_indirect(scene);
+        let blocks = &mut self.blocks;
+        let mut change = 0.0f32;
+        for k in 0..blocks.targets.len() {
+            let block = blocks.targets[k];
+            let state = &mut blocks.state[block as usize];
+            let arrived = state.arrives;
+            state.arrived = arrived.flux;
+            state.peak = arrived.peak;
+            state.has_indirect = arrived.peak > 0.0;
+            change = change.max(arrived.change);
+            // What only one bounce is asked for does not change what is sent out.
+            let resent = if blocks.kept == Kept::Once {
+                0.0
+            } else {
+                arrived.change
+            };
+            blocks.touch(block, resent);
+            blocks.mark_changed(block);
+        }
+        limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
+        let peaks = self.blocks.alive.iter();
+        let peak = peaks.fold(0.0f32, |m, &block| {
+            m.max(self.blocks.state[block as usize].peak)
+        });
+        self.blocks.forget_dark();
+        self.times.coefficients += after_coefficients - start;
+        self.times.indirect += after_coefficients.elapsed();
+        match (peak > 0.0, reflects_indirect) {
+            (false, _) => 0.0,
+            (true, false) => 1.0,
+            (true, true) => change / peak,
+        }
+    }
+
+    /// Coefficients b of the sources.
+    fn update_coefficients(&mut self, scene: &Scene, reflects_indirect: bool) {
+        let executor = &*self.config.executor;
+        let level = self.config.simd;
+        let layout = &*self.layout;
+        let (direct, indirect) = (&self.direct, &self.indirect);
+        let size = 3 * layout.coefficient_stride;
+        let Blocks {
+            sources,
+            state,
+            has_coefficients,
+            ..
+        } = &mut self.blocks;
+        let tasks = task_count(executor, sources.len());
+        let parts = Parts {
+            list: sources,
+            tasks,
+            next: 0,
+            coefficients: Cut::new(&mut self.coefficients, size),
+            flags: Cut::new(has_coefficients, 1),
+            state: Cut::new(state, 1),
+            scratch: self.scratch.iter_mut(),
+        };
+        run_parts(executor, parts, |part: Part<'_>| {
+            for &block in part.list {
+                let place = block as usize;
+                let at = place - part.first;
+                let coefficients = &mut part.coefficients[at * size..(at + 1) * size];
+                let state = &mut part.state[at];
+                let reflects_indirect = reflects_indirect && state.has_indirect;
+                if !state.has_fresh && !reflects_indirect {
+                    coefficients.fill(0.0);
+                    part.flags[at] = false;
+                    (state.sent, state.fresh) = ([0.0; 3], [0.0; 3]);
+                    continue;
+                }
+                let slots = layout.slots[place].clone();
+                let emits = scene.surface.emitting.binary_search(&block).is_ok();
+                let Sent { all, fresh } = level.run(CoefficientsOf {
+                    shape: &scene.shapes[layout.shapes[place] as usize],
+                    direct: direct.block(slots.clone()),
+                    indirect: reflects_indirect.then(|| indirect.block(slots.clone())),
+                    albedo: scene.surface.albedo.block(slots.clone()),
+                    emission: emits.then(|| scene.surface.emission.block(slots.clone())),
+                    scratch: part.scratch,
+                    coefficients,
+                });
+                (state.sent, state.fresh) = (all, fresh);
+                part.flags[at] = coefficients.iter().any(|&b| b != 0.0);
+            }
+        });
+    }
+
+    /// Indirect light of the targets.
+    fn update_indirect(&mut self, scene: &Scene) {
+        let executor = &*self.config.executor;
+        let level = self.config.simd;
+        let layout = &*self.layout;
+        let (coefficients, gate_values) = (&self.coefficients, &self.gate_values);
+        let size = 3 * layout.joint_stride;
+        let Blocks {
+            targets,
+            state,
+            has_coefficients,
+            ..
+        } = &mut self.blocks;
+        let has_coefficients = &*has_coefficients;
+        let tasks = task_count(executor, targets.len());
+        let parts = TargetParts {
+            list: targets,
+            slots: &layout.slots,
+            tasks,
+            next: 0,
+            joint: Cut::new(&mut self.joint, size),
+            state: Cut::new(state, 1),
+            planes: CutPlanes::new(&mut self.indirect),
+            scratch: self.scratch.iter_mut(),
+        };
+        run_parts(executor, parts, |mut part: TargetPart<'_>| {
+            for &block in part.list {
+                let place = block as usize;
+                let at = place - part.first;
+                let slots = layout.slots[place].clone();
+                let slots = slots.start - part.first_slot..slots.end - part.first_slot;
+                let [red, green, blue] = &mut part.planes;
+                part.state[at].arrives = level.run(IndirectOf {
+                    block: place,
+                    shape: &scene.shapes[layout.shapes[place] as usize],
+                    transport: &scene.transport,
+                    coefficients,
+                    has_coefficients,
+                    gate_values,
+                    scratch: part.scratch,
+                    joint: &mut part.joint[at * size..(at + 1) * size],
+                    indirect: [
+                        &mut red[slots.clone()],
+                        &mut green[slots.clone()],
+                        &mut blue[slots],
+                    ],
+                });
+            }
+        });
+    }
+}
+
+/// A slice that is given away from the front, block by block.
+pub(super) struct Cut<'a, T> {
+    rest: &'a mut [T],
+    /// Blocks that are gone.
+    given: usize,
+    /// Elements a block.
+    size: usize,
+}
+
+impl<'a, T> Cut<'a, T> {
+    pub(super) fn new(all: &'a mut [T], size: usize) -> Self {
+        Self {
+            rest: all,
+            given: 0,
+            size,
+        }
+    }
+
+    /// The elements of these blocks; what was before them is lost.
+    pub(super) fn take(&mut self, blocks: std::ops::Range<usize>) -> &'a mut [T] {
+        let rest = std::mem::take(&mut self.rest);
+        let (_, rest) = rest.split_at_mut((blocks.start - self.given) * self.size);
+        let (taken, rest) = rest.split_at_mut(blocks.len() * self.size);
+        self.rest = rest;
+        self.given = blocks.end;
+        taken
+    }
+}
+
+/// [`Planes`], given away by ranges of slots.
+pub(super) struct CutPlanes<'a>([Cut<'a, f32>; 3]);
+
+impl<'a> CutPlanes<'a> {
+    pub(super) fn new(planes: &'a mut Planes) -> Self {
+        Self(planes.channels_mut().map(|channel| Cut::new(channel, 1)))
+    }
+
+    pub(super) fn take(&mut self, slots: std::ops::Range<usize>) -> [&'a mut [f32]; 3] {
+        let [red, green, blue] = &mut self.0;
+        [
+            red.take(slots.clone()),
+            green.take(slots.clone()),
+            blue.take(slots),
+        ]
+    }
+}
+
+/// Part number `k` of `tasks` of an ascending list.
+pub(super) fn part_of(list: &[u32], tasks: usize, k: usize) -> Option<&[u32]> {
+    (k < tasks).then(|| &list[k * list.len() / tasks..(k + 1) * list.len() / tasks])
+}
+
+/// Blocks from the first of a list to its last.
+pub(super) fn span(list: &[u32]) -> std::ops::Range<usize> {
+    match (list.first(), list.last()) {
+        (Some(&first), Some(&last)) => first as usize..last as usize + 1,
+        _ => 0..0,
+    }
+}
+
+/// Work on coefficients for one task: everything between its first block and its last.
+struct Part<'a> {
+    list: &'a [u32],
+    first: usize,
+    coefficients: &'a mut [f32],
+    flags: &'a mut [bool],
+    state: &'a mut [BlockState],
+    scratch: &'a mut Scratch,
+}
+
+struct Parts<'a> {
+    list: &'a [u32],
+    tasks: usize,
+    next: usize,
+    coefficients: Cut<'a, f32>,
+    flags: Cut<'a, bool>,
+    state: Cut<'a, BlockState>,
+    scratch: std::slice::IterMut<'a, Scratch>,
+}
+
+impl<'a> Iterator for Parts<'a> {
+    type Item = Part<'a>;
+
+    fn next(&mut self) -> Option<Part<'a>> {
+        let list = part_of(self.list, self.tasks, self.next).filter(|list| !list.is_empty())?;
+        self.next += 1;
+        let span = span(list);
+        Some(Part {
+            list,
+            first: span.start,
+            coefficients: self.coefficients.take(span.clone()),
+            flags: self.flags.take(span.clone()),
+            state: self.state.take(span),
+            scratch: self.scratch.next()?,
+        })
+    }
+}
+
+/// Work on indirect light for one task.
+struct TargetPart<'a> {
+    list: &'a [u32],
+    first: usize,
+    first_slot: usize,
+    joint: &'a mut [f32],
+    state: &'a mut [BlockState],
+    planes: [&'a mut [f32]; 3],
+    scratch: &'a mut Scratch,
+}
+
+struct TargetParts<'a> {
+    list: &'a [u32],
+    slots: &'a [std::ops::Range<usize>],
+    tasks: usize,
+    next: usize,
+    joint: Cut<'a, f32>,
+    state: Cut<'a, BlockState>,
+    planes: CutPlanes<'a>,
+    scratch: std::slice::IterMut<'a, Scratch>,
+}
+
+impl<'a> Iterator for TargetParts<'a> {
+    type Item = TargetPart<'a>;
+
+    fn next(&mut self) -> Option<TargetPart<'a>> {
+        let list = part_of(self.list, self.tasks, self.next).filter(|list| !list.is_empty())?;
+        self.next += 1;
+        let span = span(list);
+        let slots = self.slots[span.start].start..self.slots[span.end - 1].end;
+        Some(TargetPart {
+            list,
+            first: span.start,
+            first_slot: slots.start,
+            joint: self.joint.take(span.clone()),
+            state: self.state.take(span),
+            planes: self.planes.take(slots),
+            scratch: self.scratch.next()?,
+        })
+    }
+}
