@@ -1,0 +1,621 @@
+//! Where a light's direct light goes: beams through the level's openings, followed outwards from the light.
+//!
+//! A beam is a light seen through one sequence of openings. Seen from the light, what an opening lets through is a
+//! cone with the opening's edges for its sides, and what a sequence lets through is the intersection of its cones:
+//! Luebke and Georges, "Portals and mirrors", I3D 1995, with exact polygons in place of their rectangles. The
+//! polygon of each opening is clipped by the cone (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974),
+//! and the planes of its remaining edges are the next cone. The sign conditions are those of
+//! [`Openings`](crate::visibility::Openings), which asks from the receiver's end.
+//!
+//! The cones of different sequences do not overlap, so a block's direct light is the sum over its beams.
+
+use crate::light::{Light, PlacedLight};
+use crate::scene::{Beyond, Portal, Scene, SceneBlock};
+use glam::{DVec3, Vec3};
+use mrt_core::cube::Face;
+use mrt_core::tube::TubeForm;
+
+/// Planes of a beam, at most. Openings of four corners give four, and more where crooked ones overlap; round ones
+/// are beyond it.
+pub const MAX_PLANES: usize = 24;
+
+/// Beams that wait to be followed, at most. One waits for each opening that was passed by on the way, so a straight
+/// corridor of any length needs one; a beam that enters an open hall of 300 x 300 blocks needs a few hundred.
+const MAX_PENDING: usize = 1024;
+
+/// Corners of an opening, at most: those of a tube's end.
+const MAX_CORNERS: usize = 32;
+
+/// Corners of an opening after clipping by every plane: each cuts off one corner and leaves two.
+const MAX_CLIPPED: usize = MAX_CORNERS + MAX_PLANES;
+
+/// A point this near to a plane, in sizes of the opening or block, is on it: a thousand roundings of its coordinates
+/// at [`FAR_LIMIT`](crate::level::FAR_LIMIT). A sliver of shadow or light of that width is below what `f32` texels
+/// resolve.
+const ON_PLANE: f64 = 1e-9;
+
+/// Openings of which the light sees less than this share of the area are closed. It ends paths that only rounding
+/// keeps open, such as those around an edge where four blocks meet.
+const SMALLEST_SHARE: f64 = 1e-10;
+
+/// A light's direct light in a block, through one sequence of openings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beam {
+    /// The block that it lights.
+    pub block: u32,
+    /// The light's index, as given to [`BeamTracer::trace`].
+    pub light: u32,
+    /// Product of the values of the doors on the way, in (0, 1].
+    pub fraction: f32,
+    /// Where the planes have their origin, metres: the light, or a point of the block for directional lights.
+    /// Differences from it keep their digits far from the world's origin.
+    pub origin: Vec3,
+    planes: [[f32; 4]; MAX_PLANES],
+    plane_count: u32,
+    /// True if planes do not tell which points are lit: a bend or too many planes are on the way. The light's
+    /// irradiance in this block is then that of [`add_exact`](crate::direct::add_exact), which takes the
+    /// place of all beams of this light in this block.
+    pub exact: bool,
+}
+
+impl Beam {
+    /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for
+    /// all. Planes that the whole block is inside of are left out.
+    pub fn planes(&self) -> &[[f32; 4]] {
+        &self.planes[..self.plane_count as usize]
+    }
+}
+
+/// Follows lights through the openings of one scene. Made once; tracing allocates nothing.
+#[derive(Debug)]
+pub struct BeamTracer {
+    /// Openings that lead outside: the block, and which of its portals.
+    outside: Vec<(u32, u32)>,
+    /// Beams to be followed further.
+    pending: Vec<Node>,
+    /// For each block, the trace that last gave it an exact beam.
+    exact: Vec<u32>,
+    /// Number of the trace that runs.
+    trace: u32,
+}
+
+/// A half-space: `p · normal + offset >= 0`, p from the trace's origin.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    /// Of unit length.
+    normal: DVec3,
+    /// Metres.
+    offset: f64,
+}
+
+impl Plane {
+    const NONE: Plane = Plane {
+        normal: DVec3::ZERO,
+        offset: 0.0,
+    };
+
+    fn at(&self, point: DVec3) -> f64 {
+        self.normal.dot(point) + self.offset
+    }
+}
+
+/// The intersection of half-spaces that light is in.
+#[derive(Clone, Copy, Debug)]
+struct Cone {
+    planes: [Plane; MAX_PLANES],
+    count: usize,
+    /// False if light is in a part of the cone only.
+    is_exact: bool,
+}
+
+impl Cone {
+    const EVERYWHERE: Cone = Cone {
+        planes: [Plane::NONE; MAX_PLANES],
+        count: 0,
+        is_exact: true,
+    };
+
+    fn planes(&self) -> &[Plane] {
+        &self.planes[..self.count]
+    }
+
+    fn push(&mut self, plane: Plane) {
+        if self.count < MAX_PLANES {
+            self.planes[self.count] = plane;
+            self.count += 1;
+        } else {
+            self.is_exact = false;
+        }
+    }
+}
+
+/// A beam on its way.
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    block: u32,
+    entered: Option<Face>,
+    /// Openings passed.
+    depth: u32,
+    fraction: f32,
+    cone: Cone,
+}
+
+/// The light, as the geometry sees it.
+#[derive(Clone, Copy, Debug)]
+struct Source {
+    /// Where coordinates start: the light, or a point of the first block.
+    origin: DVec3,
+    /// To a light at infinity.
+    toward: Option<DVec3>,
+    cone: Option<SpotCone>,
+}
+
+/// The directions that a spot shines in.
+#[derive(Clone, Copy, Debug)]
+struct SpotCone {
+    /// Of unit length.
+    axis: DVec3,
+    /// Of the outer angle.
+    sine: f64,
+    cosine: f64,
+}
+
+impl SpotCone {
+    /// At most the distance of a point from the cone, metres; negative inside. In the plane of axis and point, it is
+    /// the distance from the cone's side, continued beyond the light.
+    fn distance(&self, point: DVec3) -> f64 {
+        let along = point.dot(self.axis);
+        let across = (point - along * self.axis).length();
+        across * self.cosine - along * self.sine
+    }
+}
+
+/// What one trace works on.
+struct Trace<'a> {
+    scene: &'a Scene,
+    doors: &'a [f32],
+    light: u32,
+    /// The light's block.
+    home: Option<usize>,
+    source: Source,
+    emit: &'a mut dyn FnMut(&Beam),
+}
+
+impl BeamTracer {
+    /// Finds the scene's openings to the outside, and allocates what tracing needs: 1 kB for each of up to 1024
+    /// beams, fewer in small scenes.
+    pub fn new(scene: &Scene) -> Self {
+        let blocks = scene.blocks.iter().enumerate();
+        let outside = blocks
+            .flat_map(|(index, block)| {
+                let portals = block.portals.iter().enumerate();
+                portals
+                    .filter(|(_, portal)| block.beyond[portal.face.index()] == Beyond::Outside)
+                    .map(move |(k, _)| (index as u32, k as u32))
+            })
+            .collect();
+        Self {
+            outside,
+            // A cube has five openings besides the one entered, and the light's block six.
+            pending: Vec::with_capacity(MAX_PENDING.min(5 * scene.blocks.len() + 1)),
+            exact: vec![0; scene.blocks.len()],
+            trace: 0,
+        }
+    }
+
+    /// Calls `emit` for each beam of a light, `light` being the index that beams name it by.
+    ///
+    /// An [exact](Beam::exact) beam comes at most once a block. It may come after other beams of its block, which it
+    /// replaces; none comes after it. Lights without intensity have no beams; light beyond closed doors has none.
+    ///
+    /// Cost: half a microsecond for each block that a beam enters, and a test for each opening to the outside if the
+    /// light is directional.
+    ///
+    /// # Panics
+    /// If the scene is another than the tracer's, or `doors` are not as many as its doors.
+    pub fn trace(
+        &mut self,
+        scene: &Scene,
+        light: u32,
+        placed: &PlacedLight,
+        doors: &[f32],
+        emit: &mut dyn FnMut(&Beam),
+    ) {
+        assert_eq!(self.exact.len(), scene.blocks.len(), "blocks of the scene");
+        assert_eq!(doors.len(), scene.doors.len(), "doors of the scene");
+        self.start_marks();
+        let (source, power) = Source::new(&placed.light);
+        if power == Vec3::ZERO {
+            return;
+        }
+        let mut trace = Trace {
+            scene,
+            doors,
+            light,
+            home: placed.block,
+            source,
+            emit,
+        };
+        match placed.block {
+            Some(block) => {
+                let node = Node {
+                    block: block as u32,
+                    entered: None,
+                    depth: 0,
+                    fraction: 1.0,
+                    cone: Cone::EVERYWHERE,
+                };
+                self.enter(&mut trace, node);
+                self.follow(&mut trace);
+            }
+            None => {
+                for k in 0..self.outside.len() {
+                    let (block, portal) = self.outside[k];
+                    self.enter_from_outside(&mut trace, block, portal);
+                    self.follow(&mut trace);
+                }
+            }
+        }
+    }
+
+    fn start_marks(&mut self) {
+        self.pending.clear();
+        self.trace = self.trace.wrapping_add(1);
+        if self.trace == 0 {
+            self.exact.fill(0);
+            self.trace = 1;
+        }
+    }
+
+    fn enter_from_outside(&mut self, trace: &mut Trace<'_>, index: u32, portal: u32) {
+        let block = &trace.scene.blocks[index as usize];
+        let portal = &block.portals[portal as usize];
+        if trace
+            .source
+            .toward
+            .is_none_or(|d| d.dot(portal.outward) <= 0.0)
+        {
+            return;
+        }
+        trace.source.origin = block.warp.corners[0];
+        let fraction = match block.doors[portal.face.index()] {
+            Some(door) => trace.doors[door as usize],
+            None => 1.0,
+        };
+        if let Some(cone) = narrowed(&Cone::EVERYWHERE, &trace.source, portal, 0) {
+            let node = Node {
+                block: index,
+                entered: Some(portal.face),
+                depth: 1,
+                fraction,
+                cone,
+            };
+            self.enter(trace, node);
+        }
+    }
+
+    /// Follows everything that is pending.
+    fn follow(&mut self, trace: &mut Trace<'_>) {
+        let scene = trace.scene;
+        while let Some(node) = self.pending.pop() {
+            let block = &scene.blocks[node.block as usize];
+            // As far as a line that enters each block at most once can get.
+            if node.depth as usize + 1 >= scene.blocks.len() + usize::from(trace.home.is_none()) {
+                continue;
+            }
+            for portal in &block.portals {
+                let Beyond::Block {
+                    block: next, face, ..
+                } = block.beyond[portal.face.index()]
+                else {
+                    continue;
+                };
+                if Some(portal.face) == node.entered || Some(next) == trace.home {
+                    continue;
+                }
+                let value = match block.doors[portal.face.index()] {
+                    Some(door) => trace.doors[door as usize],
+                    None => 1.0,
+                };
+                let fraction = node.fraction * value;
+                // The far side's outline is the one that receivers beyond it ask.
+                let beyond = scene.blocks[next].portals.iter().find(|p| p.face == face);
+                let Some(beyond) = beyond.filter(|_| fraction > 0.0) else {
+                    continue;
+                };
+                if let Some(cone) = narrowed(&node.cone, &trace.source, beyond, node.depth) {
+                    let next = Node {
+                        block: next as u32,
+                        entered: Some(face),
+                        depth: node.depth + 1,
+                        fraction,
+                        cone,
+                    };
+                    self.enter(trace, next);
+                }
+            }
+        }
+    }
+
+    /// Emits the beam of a block that light has entered, and leaves it pending.
+    fn enter(&mut self, trace: &mut Trace<'_>, mut node: Node) {
+        if !(node.fraction > 0.0) {
+            return;
+        }
+        let block = &trace.scene.blocks[node.block as usize];
+        if trace.source.misses(block) {
+            return;
+        }
+        let Some(mut beam) = beam_in(block, &trace.source, &node) else {
+            return;
+        };
+        // Light that has crossed a bend, or part of one, is not in a cone.
+        if block.shape.tube() == Some(TubeForm::Bend) {
+            node.cone.is_exact = false;
+            beam.exact = true;
+        }
+        beam.light = trace.light;
+        self.give(trace, &beam);
+        if self.pending.len() < self.pending.capacity() {
+            self.pending.push(node);
+        } else {
+            // More than fits is yet to be lit, and receivers find out by themselves what is.
+            self.pending.clear();
+            for block in 0..trace.scene.blocks.len() as u32 {
+                beam.block = block;
+                beam.exact = true;
+                self.give(trace, &beam);
+            }
+        }
+    }
+
+    fn give(&mut self, trace: &mut Trace<'_>, beam: &Beam) {
+        let mark = &mut self.exact[beam.block as usize];
+        if *mark != self.trace {
+            if beam.exact {
+                *mark = self.trace;
+            }
+            (trace.emit)(beam);
+        }
+    }
+}
+
+/// The beam of a light in a block, less the planes that the whole block is inside of; `None` if it is outside of one.
+///
+/// The image of a trilinear map is in the hull of its corners, and so is a tube in its cube.
+fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
+    let origin = match source.toward {
+        None => source.origin,
+        Some(_) => block.warp.corners[0],
+    }
+    .as_vec3();
+    let shift = origin.as_dvec3() - source.origin;
+    let mut beam = Beam {
+        block: node.block,
+        light: 0,
+        fraction: node.fraction,
+        origin,
+        planes: [[0.0; 4]; MAX_PLANES],
+        plane_count: 0,
+        exact: !node.cone.is_exact,
+    };
+    let (low, high) = block.bounds;
+    let slack = ON_PLANE * (high - low).length();
+    for plane in node.cone.planes() {
+        let (mut smallest, mut largest) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &corner in &block.warp.corners {
+            let distance = plane.at(corner - source.origin);
+            smallest = smallest.min(distance);
+            largest = largest.max(distance);
+        }
+        if largest <= slack {
+            return None;
+        }
+        if smallest < -slack {
+            let n = plane.normal.as_vec3();
+            let w = plane.at(shift) as f32;
+            beam.planes[beam.plane_count as usize] = [n.x, n.y, n.z, w];
+            beam.plane_count += 1;
+        }
+    }
+    Some(beam)
+}
+
+/// What of a cone passes an opening into the block whose portal it is; `None` if nothing does. `depth` openings
+/// were passed before.
+fn narrowed(cone: &Cone, source: &Source, portal: &Portal, depth: u32) -> Option<Cone> {
+    let count = portal.corners.len();
+    let mut out = Cone { count: 0, ..*cone };
+    if count > MAX_CORNERS {
+        out.is_exact = false;
+        out.count = cone.count;
+        return Some(out);
+    }
+    let mut loop_ = Clipped::EMPTY;
+    for &corner in &portal.corners {
+        loop_.push(corner - source.origin, loop_.count as u8);
+    }
+    let corner = |k: usize| loop_.corners[k % count];
+    let mut sides = [Plane::NONE; MAX_CORNERS];
+    for (k, side) in sides.iter_mut().enumerate().take(count) {
+        *side = source.plane_through(corner(k), corner(k + 1));
+    }
+    // On which side of each edge the corner after it is: inside all in the outline of a convex opening, as the light
+    // sees it.
+    let size = portal.outward.length().sqrt();
+    let (mut is_front, mut is_back) = (false, false);
+    for (k, side) in sides[..count].iter().enumerate() {
+        let turn = side.at(corner(k + 2));
+        is_front |= turn > ON_PLANE * size;
+        is_back |= turn < -ON_PLANE * size;
+    }
+    if is_front && is_back {
+        // A bent opening that is not convex from here.
+        out.is_exact = false;
+    }
+    // A light that stands in an opening of its own block, or beyond it by rounding, shines into the next.
+    if !is_front && (depth > 0 || source.toward.is_some()) {
+        return None;
+    }
+    for (k, plane) in cone.planes().iter().enumerate() {
+        loop_.clip(plane, (MAX_CORNERS + k) as u8, ON_PLANE * size)?;
+    }
+    if loop_.area() <= SMALLEST_SHARE * size * size {
+        return None;
+    }
+    let mut taken = 0u64;
+    for &edge in &loop_.edges[..loop_.count] {
+        if taken & (1 << edge) != 0 {
+            continue;
+        }
+        taken |= 1 << edge;
+        let plane = match usize::from(edge) {
+            k if k < MAX_CORNERS => sides[k],
+            k => cone.planes[k - MAX_CORNERS],
+        };
+        if plane.normal != DVec3::ZERO {
+            out.push(plane);
+        }
+    }
+    Some(out)
+}
+
+/// A polygon, from the trace's origin, whose edges know the planes that they are on.
+struct Clipped {
+    corners: [DVec3; MAX_CLIPPED],
+    /// Of the edge from each corner to the next: an edge of the opening, or [`MAX_CORNERS`] and a plane of the cone.
+    edges: [u8; MAX_CLIPPED],
+    count: usize,
+}
+
+impl Clipped {
+    const EMPTY: Clipped = Clipped {
+        corners: [DVec3::ZERO; MAX_CLIPPED],
+        edges: [0; MAX_CLIPPED],
+        count: 0,
+    };
+
+    /// Drops what does not fit; a convex polygon never has so many corners, and of a polygon that is not convex
+    /// the cone is not exact.
+    fn push(&mut self, corner: DVec3, edge: u8) {
+        if self.count < MAX_CLIPPED {
+            (self.corners[self.count], self.edges[self.count]) = (corner, edge);
+            self.count += 1;
+        }
+    }
+
+    /// Keeps what is inside a plane, or outside by at most `slack` metres; `None` if nothing is.
+    fn clip(&mut self, plane: &Plane, edge: u8, slack: f64) -> Option<()> {
+        let mut distances = [0.0; MAX_CLIPPED];
+        let mut inside = 0;
+        for (distance, &corner) in distances.iter_mut().zip(&self.corners[..self.count]) {
+            *distance = plane.at(corner);
+            inside += usize::from(*distance >= -slack);
+        }
+        if inside == self.count {
+            return Some(());
+        }
+        if inside == 0 {
+            return None;
+        }
+        let mut out = Clipped::EMPTY;
+        for k in 0..self.count {
+            let next = if k + 1 == self.count { 0 } else { k + 1 };
+            let (here, there) = (distances[k], distances[next]);
+            let crossing = || {
+                let t = (here / (here - there)).clamp(0.0, 1.0);
+                self.corners[k] + (self.corners[next] - self.corners[k]) * t
+            };
+            match (here >= -slack, there >= -slack) {
+                (true, true) => out.push(self.corners[k], self.edges[k]),
+                (true, false) => {
+                    out.push(self.corners[k], self.edges[k]);
+                    out.push(crossing(), edge);
+                }
+                (false, true) => out.push(crossing(), self.edges[k]),
+                (false, false) => {}
+            }
+        }
+        *self = out;
+        (self.count >= 3).then_some(())
+    }
+
+    /// Square metres, of the polygon laid flat.
+    fn area(&self) -> f64 {
+        let corners = &self.corners[..self.count];
+        let first = corners[0];
+        let fans = corners.windows(2);
+        let sum: DVec3 = fans.map(|c| (c[0] - first).cross(c[1] - first)).sum();
+        0.5 * sum.length()
+    }
+}
+
+impl Source {
+    /// The light's geometry, and its intensity or irradiance.
+    fn new(light: &Light) -> (Self, Vec3) {
+        let at = |position: Vec3, cone| Source {
+            origin: position.as_dvec3(),
+            toward: None,
+            cone,
+        };
+        match *light {
+            Light::Sphere {
+                position,
+                intensity,
+                ..
+            } => (at(position, None), intensity),
+            Light::Spot {
+                position,
+                intensity,
+                direction,
+                outer_angle,
+                ..
+            } => {
+                let (sine, cosine) = f64::from(outer_angle).sin_cos();
+                let cone = SpotCone {
+                    axis: direction.as_dvec3().normalize(),
+                    sine,
+                    cosine,
+                };
+                (at(position, Some(cone)), intensity)
+            }
+            Light::Directional {
+                direction,
+                irradiance,
+            } => {
+                let source = Source {
+                    origin: DVec3::ZERO,
+                    toward: Some(-direction.as_dvec3().normalize()),
+                    cone: None,
+                };
+                (source, irradiance)
+            }
+        }
+    }
+
+    /// The plane through the light and an edge, with the light's part of the opening inside; one that keeps
+    /// everything if the light is on the edge's line.
+    fn plane_through(&self, from: DVec3, to: DVec3) -> Plane {
+        let normal = match self.toward {
+            None => to.cross(from),
+            Some(toward) => toward.cross(to - from),
+        };
+        let Some(normal) = normal.try_normalize() else {
+            return Plane::NONE;
+        };
+        let offset = match self.toward {
+            None => 0.0,
+            Some(_) => -normal.dot(from),
+        };
+        Plane { normal, offset }
+    }
+
+    /// True if a spot's cone passes a block by, and so everything beyond it that light reaches through the block.
+    fn misses(&self, block: &SceneBlock) -> bool {
+        let (low, high) = block.bounds;
+        // With a margin for angles that kernels round.
+        let (center, radius) = (0.5 * (low + high), 0.501 * (high - low).length());
+        self.cone
+            .is_some_and(|cone| cone.distance(center - self.origin) > radius)
+    }
+}
