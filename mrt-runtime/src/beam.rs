@@ -17,7 +17,7 @@ use mrt_core::tube::TubeForm;
 
 /// Planes of a beam, at most. Openings of four corners give four, and more where crooked ones overlap; round ones
 /// are beyond it.
-pub const MAX_PLANES: usize = 24;
+pub const MAX_PLANES: usize = 16;
 
 /// Beams that wait to be followed, at most. One waits for each opening that was passed by on the way, so a straight
 /// corridor of any length needs one; a beam that enters an open hall of 300 x 300 blocks needs a few hundred.
@@ -28,6 +28,9 @@ const MAX_CORNERS: usize = 32;
 
 /// Corners of an opening after clipping by every plane: each cuts off one corner and leaves two.
 const MAX_CLIPPED: usize = MAX_CORNERS + MAX_PLANES;
+
+/// The same for openings of four corners, as nearly all are.
+const FEW_CLIPPED: usize = 4 + MAX_PLANES;
 
 /// A point this near to a plane, in sizes of the opening or block, is on it: a thousand roundings of its coordinates
 /// at [`FAR_LIMIT`](crate::level::FAR_LIMIT). A sliver of shadow or light of that width is below what `f32` texels
@@ -61,6 +64,8 @@ pub struct Beam {
 impl Beam {
     /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for
     /// all. Planes that the whole block is inside of are left out.
+    ///
+    /// In `f32`, with w added last, points in the plane where two beams of a light meet are in exactly one.
     pub fn planes(&self) -> &[[f32; 4]] {
         &self.planes[..self.plane_count as usize]
     }
@@ -143,7 +148,7 @@ struct Node {
 /// The light, as the geometry sees it.
 #[derive(Clone, Copy, Debug)]
 struct Source {
-    /// Where coordinates start: the light, or a point of the first block.
+    /// Where coordinates start: the light, or the world's origin if it is at infinity.
     origin: DVec3,
     /// To a light at infinity.
     toward: Option<DVec3>,
@@ -277,7 +282,6 @@ impl BeamTracer {
         {
             return;
         }
-        trace.source.origin = block.warp.corners[0];
         let fraction = match block.doors[portal.face.index()] {
             Some(door) => trace.doors[door as usize],
             None => 1.0,
@@ -339,7 +343,7 @@ impl BeamTracer {
 
     /// Emits the beam of a block that light has entered, and leaves it pending.
     fn enter(&mut self, trace: &mut Trace<'_>, mut node: Node) {
-        if !(node.fraction > 0.0) {
+        if node.fraction <= 0.0 {
             return;
         }
         let block = &trace.scene.blocks[node.block as usize];
@@ -413,7 +417,11 @@ fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
         }
         if smallest < -slack {
             let n = plane.normal.as_vec3();
-            let w = plane.at(shift) as f32;
+            let mut w = plane.at(shift) as f32;
+            // Two beams meet in a plane that each sees from its side, to the bit. A texel in it is in one of them.
+            if n.to_array().into_iter().find(|&x| x != 0.0) < Some(0.0) {
+                w = w.next_down();
+            }
             beam.planes[beam.plane_count as usize] = [n.x, n.y, n.z, w];
             beam.plane_count += 1;
         }
@@ -424,101 +432,128 @@ fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
 /// What of a cone passes an opening into the block whose portal it is; `None` if nothing does. `depth` openings
 /// were passed before.
 fn narrowed(cone: &Cone, source: &Source, portal: &Portal, depth: u32) -> Option<Cone> {
+    match portal.corners.len() {
+        4 => narrowed_within::<FEW_CLIPPED>(cone, source, portal, depth),
+        ..=MAX_CORNERS => narrowed_within::<MAX_CLIPPED>(cone, source, portal, depth),
+        _ => Some(Cone {
+            is_exact: false,
+            ..*cone
+        }),
+    }
+}
+
+/// [`narrowed`], with polygons of at most `N` corners.
+fn narrowed_within<const N: usize>(
+    cone: &Cone,
+    source: &Source,
+    portal: &Portal,
+    depth: u32,
+) -> Option<Cone> {
     let count = portal.corners.len();
-    let mut out = Cone { count: 0, ..*cone };
-    if count > MAX_CORNERS {
-        out.is_exact = false;
-        out.count = cone.count;
-        return Some(out);
+    let corner = |k: usize| portal.corners[if k < count { k } else { k - count }] - source.origin;
+    let size = portal.outward.length().sqrt();
+    let slack = ON_PLANE * size;
+    let mut outline = Clipped::<N>::EMPTY;
+    for k in 0..count {
+        outline.push(corner(k), k as u8);
     }
-    let mut loop_ = Clipped::EMPTY;
-    for &corner in &portal.corners {
-        loop_.push(corner - source.origin, loop_.count as u8);
+    let mut spare = Clipped::EMPTY;
+    for (k, plane) in cone.planes().iter().enumerate() {
+        if outline.clip(plane, (count + k) as u8, slack, &mut spare)? {
+            std::mem::swap(&mut outline, &mut spare);
+        }
     }
-    let corner = |k: usize| loop_.corners[k % count];
-    let mut sides = [Plane::NONE; MAX_CORNERS];
-    for (k, side) in sides.iter_mut().enumerate().take(count) {
-        *side = source.plane_through(corner(k), corner(k + 1));
+    if outline.area() <= SMALLEST_SHARE * size * size {
+        return None;
     }
+    let mut sides = [Plane::NONE; N];
     // On which side of each edge the corner after it is: inside all in the outline of a convex opening, as the light
     // sees it.
-    let size = portal.outward.length().sqrt();
     let (mut is_front, mut is_back) = (false, false);
-    for (k, side) in sides[..count].iter().enumerate() {
+    for (k, side) in sides[..count].iter_mut().enumerate() {
+        *side = source.plane_through(corner(k), corner(k + 1));
         let turn = side.at(corner(k + 2));
-        is_front |= turn > ON_PLANE * size;
-        is_back |= turn < -ON_PLANE * size;
-    }
-    if is_front && is_back {
-        // A bent opening that is not convex from here.
-        out.is_exact = false;
+        is_front |= turn > slack;
+        is_back |= turn < -slack;
     }
     // A light that stands in an opening of its own block, or beyond it by rounding, shines into the next.
     if !is_front && (depth > 0 || source.toward.is_some()) {
         return None;
     }
-    for (k, plane) in cone.planes().iter().enumerate() {
-        loop_.clip(plane, (MAX_CORNERS + k) as u8, ON_PLANE * size)?;
-    }
-    if loop_.area() <= SMALLEST_SHARE * size * size {
-        return None;
-    }
     let mut taken = 0u64;
-    for &edge in &loop_.edges[..loop_.count] {
-        if taken & (1 << edge) != 0 {
-            continue;
-        }
+    for &edge in &outline.edges[..outline.count] {
         taken |= 1 << edge;
-        let plane = match usize::from(edge) {
-            k if k < MAX_CORNERS => sides[k],
-            k => cone.planes[k - MAX_CORNERS],
-        };
-        if plane.normal != DVec3::ZERO {
+    }
+    if is_front && is_back {
+        // A bent opening that is not convex from here: the planes of edges that are clipped away still cut.
+        taken = u64::MAX;
+    }
+    let mut out = Cone {
+        is_exact: cone.is_exact,
+        ..Cone::EVERYWHERE
+    };
+    let planes = sides[..count].iter().chain(cone.planes());
+    for (k, &plane) in planes.enumerate() {
+        if taken & (1 << k) != 0 && plane.normal != DVec3::ZERO {
             out.push(plane);
+        }
+    }
+    // Light that grazes a bent opening can pass its outline and run against its direction, which receivers ask too.
+    let outward = portal.outward.normalize();
+    let lift = |&c: &DVec3| (c - portal.corners[0]).dot(outward).abs();
+    if portal.corners.iter().any(|c| lift(c) > slack) {
+        match source.toward {
+            None => out.push(Plane {
+                normal: -outward,
+                offset: 0.0,
+            }),
+            Some(toward) if toward.dot(outward) <= 0.0 => return None,
+            Some(_) => {}
         }
     }
     Some(out)
 }
 
 /// A polygon, from the trace's origin, whose edges know the planes that they are on.
-struct Clipped {
-    corners: [DVec3; MAX_CLIPPED],
-    /// Of the edge from each corner to the next: an edge of the opening, or [`MAX_CORNERS`] and a plane of the cone.
-    edges: [u8; MAX_CLIPPED],
+struct Clipped<const N: usize> {
+    corners: [DVec3; N],
+    /// Of the edge from each corner to the next: an edge of the opening, or their number and a plane of the cone.
+    edges: [u8; N],
     count: usize,
 }
 
-impl Clipped {
-    const EMPTY: Clipped = Clipped {
-        corners: [DVec3::ZERO; MAX_CLIPPED],
-        edges: [0; MAX_CLIPPED],
+impl<const N: usize> Clipped<N> {
+    const EMPTY: Self = Self {
+        corners: [DVec3::ZERO; N],
+        edges: [0; N],
         count: 0,
     };
 
-    /// Drops what does not fit; a convex polygon never has so many corners, and of a polygon that is not convex
-    /// the cone is not exact.
+    /// Drops what does not fit, as only a polygon that is not convex has so many corners; of such a one the edges
+    /// are not asked.
     fn push(&mut self, corner: DVec3, edge: u8) {
-        if self.count < MAX_CLIPPED {
+        if self.count < N {
             (self.corners[self.count], self.edges[self.count]) = (corner, edge);
             self.count += 1;
         }
     }
 
-    /// Keeps what is inside a plane, or outside by at most `slack` metres; `None` if nothing is.
-    fn clip(&mut self, plane: &Plane, edge: u8, slack: f64) -> Option<()> {
-        let mut distances = [0.0; MAX_CLIPPED];
+    /// Puts what is inside a plane, or outside by at most `slack` metres, in `out`; `None` if nothing is. False if
+    /// all is, and `out` is then left alone.
+    fn clip(&self, plane: &Plane, edge: u8, slack: f64, out: &mut Self) -> Option<bool> {
+        let mut distances = [0.0; N];
         let mut inside = 0;
         for (distance, &corner) in distances.iter_mut().zip(&self.corners[..self.count]) {
             *distance = plane.at(corner);
             inside += usize::from(*distance >= -slack);
         }
         if inside == self.count {
-            return Some(());
+            return Some(false);
         }
         if inside == 0 {
             return None;
         }
-        let mut out = Clipped::EMPTY;
+        out.count = 0;
         for k in 0..self.count {
             let next = if k + 1 == self.count { 0 } else { k + 1 };
             let (here, there) = (distances[k], distances[next]);
@@ -536,8 +571,7 @@ impl Clipped {
                 (false, false) => {}
             }
         }
-        *self = out;
-        (self.count >= 3).then_some(())
+        (out.count >= 3).then_some(true)
     }
 
     /// Square metres, of the polygon laid flat.
@@ -605,7 +639,9 @@ impl Source {
         };
         let offset = match self.toward {
             None => 0.0,
-            Some(_) => -normal.dot(from),
+            // The same end of the edge from both sides, so that planes are equal to the bit.
+            Some(_) if from.to_array() < to.to_array() => -normal.dot(from),
+            Some(_) => -normal.dot(to),
         };
         Plane { normal, offset }
     }
@@ -617,5 +653,71 @@ impl Source {
         let (center, radius) = (0.5 * (low + high), 0.501 * (high - low).length());
         self.cone
             .is_some_and(|cone| cone.distance(center - self.origin) > radius)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::assemble::{AssembleConfig, assemble};
+    use crate::dictionary::Dictionary;
+    use crate::level::Level;
+    use crate::light::place;
+    use mrt_core::container::ByteBudget;
+
+    /// A room of `width` by `width` cells.
+    fn room(width: i32) -> Scene {
+        let bytes = include_bytes!("../../assets/versions/2.mrt");
+        let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20));
+        let cells: Vec<[i32; 3]> = (0..width * width)
+            .map(|k| [k % width, 0, k / width])
+            .collect();
+        let level = Level::from_cells(&cells, Vec3::splat(0.5)).expect("cells side by side");
+        let config = AssembleConfig {
+            max_depth: 1,
+            ..AssembleConfig::default()
+        };
+        assemble(&level, &dictionary.expect("sound"), &config).expect("the cells' shapes")
+    }
+
+    fn lamp(scene: &Scene, position: Vec3) -> PlacedLight {
+        let light = Light::Sphere {
+            position,
+            radius: 0.1,
+            intensity: Vec3::ONE,
+        };
+        place(scene, 0, light).expect("inside")
+    }
+
+    #[test]
+    fn where_too_many_beams_wait_receivers_are_asked() {
+        let scene = room(5);
+        let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
+        let mut tracer = BeamTracer::new(&scene);
+        tracer.pending = Vec::with_capacity(1);
+        let mut exact = vec![0; 25];
+        tracer.trace(&scene, 0, &light, &[], &mut |beam| {
+            exact[beam.block as usize] += usize::from(beam.exact);
+        });
+        assert_eq!(exact, [1; 25]);
+    }
+
+    #[test]
+    fn few_beams_wait_in_an_open_hall() {
+        // Windows onto far blocks are as narrow as those are few: the most that wait, in halls of 10 x 10 to 40 x 40
+        // blocks, is one for every crossing of the width.
+        for width in [10, 40] {
+            let scene = room(width);
+            let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
+            let mut tracer = BeamTracer::new(&scene);
+            let most = 2 * width as usize;
+            tracer.pending = Vec::with_capacity(most);
+            let mut beams = 0;
+            tracer.trace(&scene, 0, &light, &[], &mut |beam| {
+                assert!(!beam.exact, "more than {most} were waiting");
+                beams += 1;
+            });
+            assert!(beams >= width * width);
+        }
     }
 }

@@ -147,10 +147,8 @@ impl<S: Unshadowed> Kernel for AddBeam<'_, S> {
             ];
             let mut inside = l.splat(0.0);
             for &[x, y, z, w] in planes {
-                let plane = splat3(l, Vec3::new(x, y, z));
-                let across = l.mul_add(plane[0], offset[0], l.splat(w));
-                let across = l.mul_add(plane[1], offset[1], across);
-                inside = l.min(inside, l.mul_add(plane[2], offset[2], across));
+                let across = dot(l, offset, splat3(l, Vec3::new(x, y, z)));
+                inside = l.min(inside, l.add(across, l.splat(w)));
             }
             // Half of a beam's texels and more may be in shadow, and shading costs more than asking.
             if !planes.is_empty() && l.largest(inside) < 0.0 {
@@ -228,7 +226,7 @@ const ASIN: [f32; 8] = [
     0.046_626_408,
     0.015_804_72,
     0.078_535_14,
-    -0.094_843_984,
+    -0.094_843_99,
     0.112_620_25,
 ];
 
