@@ -57,6 +57,7 @@ pub mod pack;
 mod propagate;
 pub mod light;
 pub mod visibility;
+pub mod beam;
 pub mod direct;
 pub mod probes;
 pub mod executor;

@@ -1,0 +1,213 @@
+//! Beams of direct light against the scalar walk, texel by texel.
+
+use glam::{DVec3, Vec3};
+use mrt_core::simd::{SimdLevel, WIDEST};
+use mrt_runtime::beam::{Beam, BeamTracer};
+use mrt_runtime::direct::{TexelPlanes, add_beam, add_exact, irradiance};
+use mrt_runtime::light::{Light, PlacedLight, WALL_TOLERANCE, place};
+use mrt_runtime::scene::Scene;
+use mrt_runtime::visibility::{Openings, Receiver, Toward, Visibility};
+
+/// Share of its own irradiance that a texel may differ by.
+const RELATIVE: f32 = 1e-5;
+
+/// Share of the irradiance of a surface that faces the light that a texel may differ by: its cosine is rounded.
+const OF_FACING: f32 = 1e-6;
+
+/// Radians that the angle from a spot's axis may differ by.
+const ANGLE: f32 = 2e-6;
+
+/// A texel whose visibility flips when it moves by this much, in diagonals of its block, is on a shadow's edge.
+const EDGE: f64 = 1e-5;
+
+/// Positions and normals of a block's texels, padded.
+pub struct Texels {
+    pub positions: [Vec<f32>; 3],
+    normals: [Vec<f32>; 3],
+    count: usize,
+}
+
+impl Texels {
+    pub fn new(scene: &Scene, block: usize) -> Self {
+        let range = scene.blocks[block].texels.clone();
+        let padded = range.len().next_multiple_of(WIDEST);
+        let plane = |of: &[Vec3], c: usize| {
+            let mut plane: Vec<f32> = of[range.clone()].iter().map(|v| v[c]).collect();
+            plane.resize(padded, 0.0);
+            plane
+        };
+        Self {
+            positions: [0, 1, 2].map(|c| plane(&scene.texel_positions, c)),
+            normals: [0, 1, 2].map(|c| plane(&scene.texel_normals, c)),
+            count: range.len(),
+        }
+    }
+
+    pub fn planes(&self) -> TexelPlanes<'_> {
+        TexelPlanes {
+            positions: [0, 1, 2].map(|c| &self.positions[c][..]),
+            normals: [0, 1, 2].map(|c| &self.normals[c][..]),
+        }
+    }
+}
+
+/// The beams of one light; an exact one stands for all of its block.
+pub fn beams(
+    scene: &Scene,
+    tracer: &mut BeamTracer,
+    light: &PlacedLight,
+    doors: &[f32],
+) -> Vec<Beam> {
+    let mut beams: Vec<Beam> = Vec::new();
+    tracer.trace(scene, 7, light, doors, &mut |beam| {
+        assert_eq!(beam.light, 7);
+        let of_block = |b: &&Beam| b.block == beam.block;
+        assert!(
+            !beams.iter().filter(of_block).any(|b| b.exact),
+            "exact once"
+        );
+        if beam.exact {
+            beams.retain(|b| b.block != beam.block);
+        }
+        beams.push(*beam);
+    });
+    beams
+}
+
+/// Irradiance at all texels from some beams, in the order of the scene's texels.
+fn lit(
+    level: SimdLevel,
+    scene: &Scene,
+    texels: &[Texels],
+    light: &PlacedLight,
+    doors: &[f32],
+    beams: &[Beam],
+) -> Vec<Vec3> {
+    let mut out = vec![Vec3::ZERO; scene.texel_count()];
+    for beam in beams {
+        let block = beam.block as usize;
+        let of_block = &texels[block];
+        let mut planes = [0, 1, 2].map(|_| vec![0.0; of_block.positions[0].len()]);
+        let slices = planes.each_mut().map(|plane| &mut plane[..]);
+        if beam.exact {
+            add_exact(scene, block, light, doors, slices);
+        } else {
+            add_beam(level, &of_block.planes(), light, beam, slices);
+        }
+        for plane in &planes {
+            assert!(plane[of_block.count..].iter().all(|&e| e == 0.0), "padding");
+        }
+        for (k, texel) in scene.blocks[block].texels.clone().enumerate() {
+            out[texel] += Vec3::new(planes[0][k], planes[1][k], planes[2][k]);
+        }
+    }
+    out
+}
+
+/// What was compared.
+#[derive(Debug, Default)]
+pub struct Tally {
+    pub texels: usize,
+    pub lit: usize,
+    pub edges: usize,
+    pub exact: usize,
+    pub beams: usize,
+    pub most_planes: usize,
+}
+
+/// Compares every texel, light and level with the reference.
+pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally) {
+    let texels: Vec<Texels> = (0..scene.blocks.len())
+        .map(|block| Texels::new(scene, block))
+        .collect();
+    let mut tracer = BeamTracer::new(scene);
+    for &light in lights {
+        let placed = place(scene, 0, light).expect("a sound light");
+        let beams = beams(scene, &mut tracer, &placed, doors);
+        tally.beams += beams.len();
+        tally.exact += beams.iter().filter(|b| b.exact).count();
+        let planes = beams.iter().map(|b| b.planes().len());
+        tally.most_planes = planes.max().unwrap_or(0).max(tally.most_planes);
+        let found: Vec<Vec<Vec3>> = SimdLevel::available()
+            .map(|level| lit(level, scene, &texels, &placed, doors, &beams))
+            .collect();
+        for (index, block) in scene.blocks.iter().enumerate() {
+            for texel in block.texels.clone() {
+                let position = scene.texel_positions[texel].as_dvec3();
+                let normal = scene.texel_normals[texel].as_dvec3();
+                let at = |position: DVec3, normal: DVec3| {
+                    let receiver = Receiver {
+                        block: index,
+                        position,
+                    };
+                    irradiance(scene, &placed, doors, receiver, normal, &Openings)
+                };
+                let expected = at(position, normal);
+                let to_light = match light {
+                    Light::Sphere { position: p, .. } | Light::Spot { position: p, .. } => {
+                        (p.as_dvec3() - position).normalize_or_zero()
+                    }
+                    Light::Directional { direction, .. } => -direction.as_dvec3().normalize(),
+                };
+                let facing = at(position, to_light);
+                let of_falloff = match light {
+                    Light::Spot {
+                        position: p,
+                        radius,
+                        intensity,
+                        inner_angle,
+                        outer_angle,
+                        ..
+                    } => {
+                        let squared = p.as_dvec3().distance_squared(position) as f32;
+                        let full = intensity / squared.max(radius * radius);
+                        full * 1.5 * ANGLE / (outer_angle - inner_angle)
+                    }
+                    _ => Vec3::ZERO,
+                };
+                let slack = RELATIVE * expected + OF_FACING * facing + of_falloff;
+                tally.texels += 1;
+                tally.lit += usize::from(expected != Vec3::ZERO);
+                let is_near = |found: &Vec<Vec3>| {
+                    let apart = (found[texel] - expected).abs();
+                    found[texel].is_finite() && apart.cmple(slack).all()
+                };
+                if found.iter().all(is_near) {
+                    continue;
+                }
+                let (low, high) = block.bounds;
+                let step = EDGE * (high - low).length();
+                let toward = match light {
+                    Light::Sphere { position, .. } | Light::Spot { position, .. } => {
+                        let position = position.as_dvec3();
+                        let block = scene.block_at(position, WALL_TOLERANCE);
+                        Toward::Point {
+                            position,
+                            block: block.expect("placed"),
+                        }
+                    }
+                    Light::Directional { .. } => Toward::Infinity(to_light),
+                };
+                let fraction = |k: i32| {
+                    let offset = DVec3::new(
+                        f64::from(k % 3 - 1),
+                        f64::from(k / 3 % 3 - 1),
+                        f64::from(k / 9 - 1),
+                    );
+                    let receiver = Receiver {
+                        block: index,
+                        position: position + offset * step,
+                    };
+                    Openings.fraction(scene, doors, receiver, toward)
+                };
+                let flips = (1..27).any(|k| fraction(k) != fraction(0));
+                let values: Vec<Vec3> = found.iter().map(|f| f[texel]).collect();
+                assert!(
+                    flips,
+                    "texel {texel} of block {index} at {position}, {light:?}: {values:?} where {expected}"
+                );
+                tally.edges += 1;
+            }
+        }
+    }
+}
