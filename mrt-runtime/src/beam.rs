@@ -93,21 +93,27 @@ impl BeamTracer {
     /// Finds the scene's openings to the outside, and allocates what tracing needs: 0.6 kB for each of up to 1024
     /// beams, fewer in small scenes.
     pub fn new(scene: &Scene) -> Self {
-        let blocks = scene.blocks.iter().enumerate();
-        let outside = blocks
-            .flat_map(|(index, block)| {
-                let portals = block.portals.iter().enumerate();
-                portals
-                    .filter(|(_, portal)| block.beyond[portal.face.index()] == Beyond::Outside)
-                    .map(move |(k, _)| (index as u32, k as u32))
-            })
-            .collect();
-        Self {
-            outside,
+        let openings = scene.blocks.iter().map(|block| block.portals.len()).sum();
+        let mut tracer = Self {
+            outside: Vec::with_capacity(openings),
             // A cube has five openings besides the one entered, and the light's block six.
             pending: Vec::with_capacity(MAX_PENDING.min(5 * scene.blocks.len() + 1)),
             exact: vec![0; scene.blocks.len()],
             trace: 0,
+        };
+        tracer.restart(scene);
+        tracer
+    }
+
+    /// Goes on with another scene of as many blocks and openings; allocates nothing.
+    pub(crate) fn restart(&mut self, scene: &Scene) {
+        self.outside.clear();
+        for (index, block) in scene.blocks.iter().enumerate() {
+            for (k, portal) in block.portals.iter().enumerate() {
+                if block.beyond[portal.face.index()] == Beyond::Outside {
+                    self.outside.push((index as u32, k as u32));
+                }
+            }
         }
     }
 

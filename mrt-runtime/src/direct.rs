@@ -82,25 +82,32 @@ pub fn irradiance<V: Visibility>(
 /// Adds one light's irradiance in a block, found texel by texel with the shadows of `Openings`: what an
 /// [exact](crate::beam::Beam::exact) beam asks for.
 ///
-/// `out` has red, green and blue, at least one value a texel each. Cost: up to microseconds a texel.
+/// `place` is the block's in the scene's [`Layout`](crate::scene::Layout); `out` has red, green and blue, one value a slot.
+/// Cost: up to microseconds a texel.
 ///
 /// # Panics
-/// If the block has more texels than `out`.
+/// If the block has more slots than `out`.
 pub fn add_exact(
     scene: &Scene,
-    block: usize,
+    place: usize,
     light: &PlacedLight,
     doors: &[f32],
     out: [&mut [f32]; 3],
 ) {
-    for (k, texel) in scene.blocks[block].texels.clone().enumerate() {
-        let position = scene.texel_positions[texel].as_dvec3();
-        let normal = scene.texel_normals[texel].as_dvec3();
+    let slots = scene.layout.slots[place].clone();
+    let block = scene.layout.order[place] as usize;
+    let [red, green, blue] = out;
+    for slot in 0..slots.len() {
+        let normal = scene.surface.normals.get(slots.start + slot).as_dvec3();
+        if normal == DVec3::ZERO {
+            continue;
+        }
+        let position = scene.surface.positions.get(slots.start + slot).as_dvec3();
         let receiver = Receiver { block, position };
         let found = irradiance(scene, light, doors, receiver, normal, &Openings);
-        out[0][k] += found.x;
-        out[1][k] += found.y;
-        out[2][k] += found.z;
+        red[slot] += found.x;
+        green[slot] += found.y;
+        blue[slot] += found.z;
     }
 }
 

@@ -325,6 +325,13 @@ impl Frame {
         Ok(())
     }
 
+    /// Lets the next frame compute everything anew, as if nothing were known: for measurements, and for callers that
+    /// changed what frames cannot see.
+    pub fn forget(&mut self) {
+        self.lights.forget();
+        self.blocks.all_stale = true;
+    }
+
     /// Forgets everything if the scene is not the one of the frame before, or has changed.
     fn begin(&mut self, scene: &Scene) {
         if self.revision == scene.surface.revision {

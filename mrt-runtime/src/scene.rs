@@ -303,6 +303,16 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// World positions, metres.
+    pub fn positions(&self) -> &Planes {
+        &self.positions
+    }
+
+    /// Unit normals into the blocks.
+    pub fn normals(&self) -> &Planes {
+        &self.normals
+    }
+
     /// A number that no other scene, and no other state of this one, has.
     pub(crate) fn next_revision() -> u64 {
         static NEXT: AtomicU64 = AtomicU64::new(1);

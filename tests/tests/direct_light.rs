@@ -5,7 +5,7 @@ mod common;
 #[path = "common/beam_check.rs"]
 mod beam_check;
 
-use beam_check::{Tally, Texels, beams, compare};
+use beam_check::{Tally, beams, compare, texels};
 use common::{Random, assembled, floor_plan, random_cells, sphere};
 use glam::{DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};
@@ -15,15 +15,12 @@ use mrt_dictionary::bake::bake;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::beam::{Beam, BeamTracer};
+use mrt_runtime::beam::BeamTracer;
 use mrt_runtime::direct::add_beam;
-use mrt_runtime::frame::{Bounces, Frame};
 use mrt_runtime::level::{Block, Connection, Door, Level, Opening};
-use mrt_runtime::light::{Light, PlacedLight, place};
+use mrt_runtime::light::{Light, place};
 use mrt_runtime::maze::maze;
-use mrt_runtime::scene::Scene;
 use mrt_runtime::shape::Shape;
-use mrt_runtime::visibility::Openings;
 
 fn random_light(level: &Level, random: &mut Random) -> Light {
     let block = &level.blocks[random.below(level.blocks.len())];
@@ -246,7 +243,7 @@ fn extreme_sizes_and_intensities_are_the_walk() {
             })
             .collect();
         // At a texel's centre, where there is no direction, and beside it.
-        let texel = scene.texel_positions[100];
+        let texel = scene.texel_position(100);
         lights.push(sphere(texel, 0.0, Vec3::splat(1e9)));
         lights.push(sphere(texel, 1e9, Vec3::splat(1e9)));
         compare(&scene, &lights, &scene.doors, &mut Tally::default());
@@ -317,12 +314,11 @@ fn tracing_and_adding_allocate_nothing() {
     let mut tracer = BeamTracer::new(&scene);
     let light = sphere(Vec3::new(0.5, 0.5, 0.5), 0.1, Vec3::ONE);
     let placed = place(&scene, 0, light).expect("inside");
-    let texels: Vec<Texels> = (0..41).map(|block| Texels::new(&scene, block)).collect();
-    let most = texels.iter().map(|t| t.positions[0].len()).max();
+    let most = scene.layout.slots.iter().map(|slots| slots.len()).max();
     let mut out = [0, 1, 2].map(|_| vec![0.0; most.expect("blocks")]);
     let counted = allocation_counter::measure(|| {
         tracer.trace(&scene, 0, &placed, &[], &mut |beam| {
-            let planes = texels[beam.block as usize].planes();
+            let planes = texels(&scene, beam.block as usize);
             let count = planes.positions[0].len();
             let slices = out.each_mut().map(|s| &mut s[..count]);
             add_beam(SimdLevel::detect(), &planes, &placed, beam, slices);
@@ -330,107 +326,4 @@ fn tracing_and_adding_allocate_nothing() {
     });
     assert_eq!(counted.count_total, 0);
     assert!(out[0].iter().any(|&e| e > 0.0));
-}
-
-/// Prints what direct light costs in a maze with four lights.
-#[test]
-#[ignore = "measures; run it alone with --release --nocapture"]
-fn cost() {
-    let level = maze(41, Vec3::splat(0.5), 1);
-    let scene = assembled(&level);
-    let lights: Vec<Light> = [0, 11, 23, 37]
-        .map(|block: usize| {
-            let center = level.blocks[block].warp.center().as_vec3();
-            sphere(center + Vec3::new(0.1, 0.2, -0.15), 0.1, Vec3::ONE)
-        })
-        .to_vec();
-    let placed: Vec<PlacedLight> = lights
-        .iter()
-        .map(|&light| place(&scene, 0, light).expect("inside"))
-        .collect();
-    let best = |run: &mut dyn FnMut()| {
-        let mut best = f64::INFINITY;
-        for _ in 0..200 {
-            let start = std::time::Instant::now();
-            run();
-            best = best.min(start.elapsed().as_secs_f64());
-        }
-        1e6 * best
-    };
-    let mut frame = Frame::new(&scene);
-    let mut old = f64::INFINITY;
-    for _ in 0..30 {
-        let bounces = Bounces::Count(0);
-        frame
-            .solve(&scene, &lights, &Openings, bounces)
-            .expect("sound");
-        old = old.min(frame.times().direct.as_secs_f64() * 1e6);
-    }
-    println!("walk: {old:.0} us, {} texels", scene.texel_count());
-    let mut tracer = BeamTracer::new(&scene);
-    let mut beams: Vec<Beam> = Vec::with_capacity(4096);
-    let traced = best(&mut || {
-        beams.clear();
-        for (k, light) in placed.iter().enumerate() {
-            tracer.trace(&scene, k as u32, light, &[], &mut |beam| beams.push(*beam));
-        }
-    });
-    let planes: usize = beams.iter().map(|b| b.planes().len()).sum();
-    println!(
-        "trace: {traced:.1} us, {} beams, {planes} planes",
-        beams.len()
-    );
-    let texels: Vec<Texels> = (0..scene.blocks.len())
-        .map(|block| Texels::new(&scene, block))
-        .collect();
-    let mut out: Vec<[Vec<f32>; 3]> = texels
-        .iter()
-        .map(|t| [0, 1, 2].map(|_| vec![0.0; t.positions[0].len()]))
-        .collect();
-    for simd in SimdLevel::available() {
-        let added = best(&mut || {
-            for beam in &beams {
-                let block = beam.block as usize;
-                let slices = out[block].each_mut().map(|plane| &mut plane[..]);
-                let light = &placed[beam.light as usize];
-                add_beam(simd, &texels[block].planes(), light, beam, slices);
-            }
-        });
-        println!("{}: add {added:.1} us", simd.name());
-    }
-    let cells: Vec<[i32; 2]> = (0..900).map(|k| [k % 30, k / 30]).collect();
-    for (name, level) in [
-        ("room 30x30", floor_plan(&cells, 0.5)),
-        (
-            "room 7x7",
-            floor_plan(
-                &cells
-                    .iter()
-                    .copied()
-                    .filter(|c| c[0] < 7 && c[1] < 7)
-                    .collect::<Vec<_>>(),
-                0.5,
-            ),
-        ),
-        ("maze 2000", maze(2000, Vec3::splat(0.5), 1)),
-    ] {
-        let scene = assembled_shallow(&level);
-        let mut tracer = BeamTracer::new(&scene);
-        let light = sphere(Vec3::new(3.4, 0.5, 3.6), 0.1, Vec3::ONE);
-        let placed = place(&scene, 0, light).expect("inside");
-        let mut count = 0;
-        let traced = best(&mut || {
-            count = 0;
-            tracer.trace(&scene, 0, &placed, &[], &mut |_| count += 1);
-        });
-        println!("{name}: {count} beams, {traced:.1} us");
-    }
-}
-
-fn assembled_shallow(level: &Level) -> Scene {
-    let config = AssembleConfig {
-        max_depth: 1,
-        ..Default::default()
-    };
-    assemble(level, common::default_dictionary(), &config).expect("fits")
 }

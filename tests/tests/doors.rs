@@ -7,6 +7,7 @@ use common::{
     random_cells, solved, sphere,
 };
 use glam::Vec3;
+use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
 use mrt_runtime::frame::{Bounces, Frame, FrameError};
 use mrt_runtime::level::{Door, Level};
@@ -24,6 +25,7 @@ const COUPLINGS: [Coupling; 2] = [Coupling::Table, Coupling::Lightfield];
 fn assembled(level: &Level, coupling: Coupling) -> Scene {
     let config = AssembleConfig {
         coupling,
+        transport_storage: Storage::F32,
         ..AssembleConfig::default()
     };
     assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")

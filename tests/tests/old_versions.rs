@@ -5,6 +5,7 @@ mod common;
 use common::{CONVERGED, floor_plan, largest_difference, solved, sphere};
 use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
+use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
 use mrt_runtime::dictionary::{Dictionary, StoredDictionary};
 use mrt_runtime::dictionary_file::DICTIONARY_VERSION;
@@ -88,7 +89,12 @@ fn version_1_lights_a_level_as_its_program_did() {
         sphere(vec3(0.4, 0.7, 0.5), 0.15, vec3(2.0, 1.5, 1.0)),
         sphere(vec3(3.6, 0.6, 2.4), 0.15, vec3(0.5, 0.7, 1.0)),
     ];
-    let scene = assemble(&level(), &read(1), &AssembleConfig::default()).expect("it fits");
+    // Figures of a program that kept operators in `f32`.
+    let config = AssembleConfig {
+        transport_storage: Storage::F32,
+        ..AssembleConfig::default()
+    };
+    let scene = assemble(&level(), &read(1), &config).expect("it fits");
     let mut frame = Frame::new(&scene);
     for (bounces, expected) in [1, 3].into_iter().zip(&VERSION_1_FIGURES) {
         frame

@@ -97,6 +97,7 @@ fn lit_to<M: OperatorMatrix>(
     let config = AssembleConfig {
         coupling,
         max_depth,
+        transport_storage: Storage::F32,
         ..AssembleConfig::default()
     };
     let scene = assemble(level, dictionary, &config).expect("the level fits the dictionary");

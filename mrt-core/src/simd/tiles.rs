@@ -288,6 +288,10 @@ unsafe fn add_column<
     };
     let x = [l.splat(red), l.splat(green), l.splat(blue)];
     for (panel, acc) in panels.iter().zip(acc) {
+        #[allow(
+            clippy::needless_range_loop,
+            reason = "iterators may not be inlined with their lanes"
+        )]
         for v in 0..VECTORS {
             let at = k * ROWS + v * L::N;
             // SAFETY: the caller's promises.
@@ -339,7 +343,7 @@ pub fn dot_rows<L: Lanes, E: Element>(
     x: [&[f32]; CHANNELS],
 ) -> [[f32; CHANNELS]; DOT_ROWS] {
     let length = x[0].len();
-    assert!(x.iter().all(|x| x.len() == length) && length % L::N == 0);
+    assert!(x.iter().all(|x| x.len() == length) && length.is_multiple_of(L::N));
     assert_eq!(rows.len(), DOT_ROWS * length, "rows");
     let mut acc = [[l.splat(0.0); CHANNELS]; DOT_ROWS];
     let mut at = 0;

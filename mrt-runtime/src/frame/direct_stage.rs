@@ -2,13 +2,25 @@
 
 use super::pass::{CutPlanes, part_of, span};
 use super::{Bounces, Frame};
-use crate::direct::irradiance;
+use crate::beam::{Beam, BeamTracer};
+use crate::direct::{TexelPlanes, add_beam, add_exact, irradiance};
 use crate::executor::{run_parts, task_count};
 use crate::light::PlacedLight;
 use crate::scene::Scene;
 use crate::visibility::{Receiver, Visibility};
 use glam::Vec3;
+use mrt_core::simd::{Kernel, Lanes, SimdLevel};
 use std::collections::VecDeque;
+use std::ops::Range;
+
+/// Beams that frames of a scene have room for: this many a block, and [`SPARE_BEAMS`] more, up to [`MAX_BEAMS`]. A light
+/// in a maze has about one a block that it reaches, one in an open hall of 30 x 30 blocks twelve. Where lights have more,
+/// texels ask for each light by itself: the same light, more slowly.
+const BEAMS_PER_BLOCK: usize = 12;
+/// See [`BEAMS_PER_BLOCK`].
+const SPARE_BEAMS: usize = 256;
+/// See [`BEAMS_PER_BLOCK`]; 19 MB.
+const MAX_BEAMS: usize = 1 << 16;
 
 /// What the direct light that a frame holds was computed from, and what is still to be done.
 #[derive(Debug)]
@@ -18,6 +30,18 @@ pub(super) struct DirectStage {
     /// Lights whose light there is, once no block waits.
     now: Vec<PlacedLight>,
     doors: Vec<f32>,
+    tracer: BeamTracer,
+    /// Beams of the lights of `now`, light after light, and of each light where.
+    beams: Vec<Beam>,
+    beams_of: Vec<Range<usize>>,
+    /// The same of the frame that begins.
+    next_beams: Vec<Beam>,
+    next_beams_of: Vec<Range<usize>>,
+    /// There was no room for all beams.
+    overflow: bool,
+    /// (block, beam) of the blocks in `list`, ascending.
+    hits: Vec<(u32, u32)>,
+    is_listed: Vec<bool>,
     /// [`Visibility::version`] of the one asked last.
     version: Option<u64>,
     source: Source,
@@ -50,10 +74,19 @@ struct Found {
 impl DirectStage {
     pub(super) fn new(scene: &Scene, tasks: usize, slots: usize) -> Self {
         let blocks = scene.blocks.len();
+        let room = (BEAMS_PER_BLOCK * blocks + SPARE_BEAMS).min(MAX_BEAMS);
         Self {
             next: Vec::with_capacity(super::MAX_LIGHTS),
             now: Vec::with_capacity(super::MAX_LIGHTS),
             doors: scene.doors.clone(),
+            tracer: BeamTracer::new(scene),
+            beams: Vec::with_capacity(room),
+            beams_of: Vec::with_capacity(super::MAX_LIGHTS),
+            next_beams: Vec::with_capacity(room),
+            next_beams_of: Vec::with_capacity(super::MAX_LIGHTS),
+            overflow: false,
+            hits: Vec::with_capacity(room),
+            is_listed: vec![false; blocks],
             version: None,
             source: Source::Nowhere,
             waiting: VecDeque::with_capacity(blocks),
@@ -65,11 +98,96 @@ impl DirectStage {
     }
 
     /// Dark, whatever the scene.
-    pub(super) fn restart(&mut self, _scene: &Scene) {
-        self.now.clear();
-        self.source = Source::Nowhere;
+    pub(super) fn restart(&mut self, scene: &Scene) {
+        self.forget();
         self.waiting.clear();
         self.is_waiting.fill(false);
+        self.tracer.restart(scene);
+    }
+
+    /// The next frame computes all direct light anew.
+    pub(super) fn forget(&mut self) {
+        self.now.clear();
+        self.beams.clear();
+        self.beams_of.clear();
+        self.source = Source::Nowhere;
+    }
+
+    /// Traces lights that are not what they were, and lets blocks wait that those light, or did.
+    fn trace(&mut self, scene: &Scene, doors: &[f32], kept: bool) {
+        let layout = &scene.layout;
+        self.next_beams.clear();
+        self.next_beams_of.clear();
+        let had_overflow = std::mem::take(&mut self.overflow);
+        for k in 0..self.next.len() {
+            let start = self.next_beams.len();
+            let known = kept && !had_overflow && self.now.get(k) == Some(&self.next[k]);
+            if known {
+                let range = self.beams_of[k].clone();
+                self.overflow |= range.len() > self.next_beams.capacity() - start;
+                if !self.overflow {
+                    self.next_beams.extend_from_slice(&self.beams[range]);
+                }
+            } else {
+                let (beams, overflow) = (&mut self.next_beams, &mut self.overflow);
+                let emit = &mut |beam: &Beam| {
+                    *overflow |= beams.len() == beams.capacity();
+                    if !*overflow {
+                        beams.push(*beam);
+                    }
+                };
+                self.tracer
+                    .trace(scene, k as u32, &self.next[k], doors, emit);
+            }
+            if self.overflow {
+                break;
+            }
+            self.next_beams_of.push(start..self.next_beams.len());
+            if !known {
+                for at in start..self.next_beams.len() {
+                    let block = self.next_beams[at].block as usize;
+                    self.wait_for(layout.rank[block]);
+                }
+            }
+        }
+        if self.overflow || had_overflow {
+            self.next_beams.truncate(if self.overflow {
+                0
+            } else {
+                self.next_beams.len()
+            });
+            for block in 0..layout.block_count() as u32 {
+                self.wait_for(block);
+            }
+        }
+        for k in 0..self.beams_of.len() {
+            if !kept || self.next.get(k) != self.now.get(k) {
+                for at in self.beams_of[k].clone() {
+                    let block = self.beams[at].block as usize;
+                    self.wait_for(layout.rank[block]);
+                }
+            }
+        }
+        std::mem::swap(&mut self.beams, &mut self.next_beams);
+        std::mem::swap(&mut self.beams_of, &mut self.next_beams_of);
+    }
+
+    /// Finds the beams that light the listed blocks.
+    fn find_hits(&mut self, scene: &Scene) {
+        self.hits.clear();
+        for &block in &self.list {
+            self.is_listed[block as usize] = true;
+        }
+        for (beam, at) in self.beams.iter().zip(0..) {
+            let place = scene.layout.rank[beam.block as usize];
+            if self.is_listed[place as usize] {
+                self.hits.push((place, at));
+            }
+        }
+        for &block in &self.list {
+            self.is_listed[block as usize] = false;
+        }
+        self.hits.sort_unstable();
     }
 
     fn wait_for(&mut self, block: u32) {
@@ -106,13 +224,29 @@ impl Frame {
             Source::CallersRays
         };
         let version = visibility.version();
-        let same_shadows = stage.source == source
+        let same_source = stage.source == source;
+        let same_shadows = same_source
             && version.is_some()
             && version == stage.version
-            && (stage.doors == self.doors || source == Source::CallersRays);
+            && (source == Source::CallersRays || stage.doors == self.doors);
+        let by_beams = source == Source::Openings;
+        if !same_source {
+            // Wherever there is light of another kind.
+            stage.beams_of.clear();
+            for k in 0..self.blocks.alive.len() {
+                let block = self.blocks.alive[k];
+                if self.blocks.state[block as usize].has_fresh {
+                    stage.wait_for(block);
+                }
+            }
+        }
         if !same_shadows || stage.next != stage.now {
-            for block in 0..scene.blocks.len() as u32 {
-                stage.wait_for(block);
+            if by_beams {
+                stage.trace(scene, &self.doors, same_shadows);
+            } else {
+                for block in 0..scene.blocks.len() as u32 {
+                    stage.wait_for(block);
+                }
             }
         }
         (stage.source, stage.version) = (source, version);
@@ -124,6 +258,11 @@ impl Frame {
             _ => usize::MAX,
         };
         stage.take(most);
+        if by_beams && !stage.overflow {
+            stage.find_hits(scene);
+        }
+        let by_beams = by_beams && !stage.overflow;
+        let level = self.config.simd;
         let executor = &*self.config.executor;
         let tasks = task_count(executor, stage.list.len());
         let mut planes = CutPlanes::new(&mut self.direct);
@@ -131,6 +270,7 @@ impl Frame {
         let mut gone = 0;
         let mut scratch = stage.scratch.iter_mut();
         let (list, lights, doors) = (&stage.list, &stage.now, &self.doors);
+        let (beams, hits) = (&stage.beams, &stage.hits);
         let layout = &scene.layout;
         let parts = (0..tasks)
             .map_while(|k| part_of(list, tasks, k).filter(|list| !list.is_empty()))
@@ -150,16 +290,21 @@ impl Frame {
                 let slots = layout.slots[place].clone();
                 let count = slots.len();
                 let new = &mut scratch[..3 * count];
-                by_asking(scene, place, lights, doors, visibility, new);
+                if by_beams {
+                    let start = hits.partition_point(|hit| hit.0 < block);
+                    let end = start + hits[start..].partition_point(|hit| hit.0 == block);
+                    let hits = &hits[start..end];
+                    by_beam(scene, place, level, lights, doors, (beams, hits), new);
+                } else {
+                    by_asking(scene, place, lights, doors, visibility, new);
+                }
                 let slots = slots.start - first_slot..slots.end - first_slot;
                 let mut result = Found::default();
-                for (channel, plane) in planes.iter_mut().enumerate() {
-                    let new = &new[channel * count..(channel + 1) * count];
-                    for (old, &new) in plane[slots.clone()].iter_mut().zip(new) {
-                        result.change = result.change.max((new - *old).abs());
-                        result.peak = result.peak.max(new);
-                        *old = new;
-                    }
+                for (plane, new) in planes.iter_mut().zip(new.chunks_exact(count)) {
+                    let old = &mut plane[slots.clone()];
+                    let channel = level.run(Replace { old, new });
+                    result.change = result.change.max(channel.change);
+                    result.peak = result.peak.max(channel.peak);
                 }
                 found[place - span.start] = result;
             }
@@ -233,6 +378,69 @@ fn by_asking<V: Visibility>(
         }
         for (channel, x) in sum.to_array().into_iter().enumerate() {
             out[channel * count + slot] = x;
+        }
+    }
+}
+
+/// Direct light of one block, beam by beam.
+fn by_beam(
+    scene: &Scene,
+    place: usize,
+    level: SimdLevel,
+    lights: &[PlacedLight],
+    doors: &[f32],
+    (beams, hits): (&[Beam], &[(u32, u32)]),
+    out: &mut [f32],
+) {
+    out.fill(0.0);
+    let slots = scene.layout.slots[place].clone();
+    let texels = TexelPlanes {
+        positions: scene.surface.positions.block(slots.clone()),
+        normals: scene.surface.normals.block(slots.clone()),
+    };
+    let (red, rest) = out.split_at_mut(slots.len());
+    let (green, blue) = rest.split_at_mut(slots.len());
+    let beam = |hit: &(u32, u32)| &beams[hit.1 as usize];
+    for of_light in hits.chunk_by(|a, b| beam(a).light == beam(b).light) {
+        let light = &lights[beam(&of_light[0]).light as usize];
+        // An exact beam stands for all of its light's.
+        if of_light.iter().any(|hit| beam(hit).exact) {
+            add_exact(scene, place, light, doors, [red, green, blue]);
+            continue;
+        }
+        for hit in of_light {
+            add_beam(level, &texels, light, beam(hit), [red, green, blue]);
+        }
+    }
+}
+
+/// Writes new values over old ones.
+struct Replace<'a> {
+    old: &'a mut [f32],
+    new: &'a [f32],
+}
+
+impl Kernel for Replace<'_> {
+    type Output = Found;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Found {
+        let (mut change, mut peak) = (l.splat(0.0), l.splat(0.0));
+        let count = self.new.len();
+        let old = &mut self.old[..count];
+        assert_eq!(count % L::N, 0, "padding");
+        let mut at = 0;
+        while at < count {
+            let new = l.load(&self.new[at..at + L::N]);
+            let old = &mut old[at..at + L::N];
+            change = l.max(l.abs(l.sub(new, l.load(old))), change);
+            peak = l.max(new, peak);
+            l.store(old, new);
+            at += L::N;
+        }
+        Found {
+            change: l.largest(change),
+            peak: l.largest(peak),
         }
     }
 }

@@ -156,10 +156,10 @@ fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut Coefficients
             &folded[2 * stride..],
         ];
         let sums = dot_rows(l, rows, x);
-        for row in 0..usize::from(group.count) {
-            for channel in 0..CHANNELS {
+        for (row, sums) in sums.iter().take(usize::from(group.count)).enumerate() {
+            for (channel, sum) in sums.iter().enumerate() {
                 let at = channel * place + usize::from(group.modes[row]);
-                block.coefficients[at] = sums[row][channel] * group.scales[row];
+                block.coefficients[at] = sum * group.scales[row];
             }
         }
     }

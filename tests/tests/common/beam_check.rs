@@ -1,7 +1,7 @@
 //! Beams of direct light against the scalar walk, texel by texel.
 
 use glam::{DVec3, Vec3};
-use mrt_core::simd::{SimdLevel, WIDEST};
+use mrt_core::simd::SimdLevel;
 use mrt_runtime::beam::{Beam, BeamTracer};
 use mrt_runtime::direct::{TexelPlanes, add_beam, add_exact, irradiance};
 use mrt_runtime::light::{Light, PlacedLight, WALL_TOLERANCE, place};
@@ -20,34 +20,12 @@ const ANGLE: f32 = 2e-6;
 /// A texel whose visibility flips when it moves by this much, in diagonals of its block, is on a shadow's edge.
 const EDGE: f64 = 1e-5;
 
-/// Positions and normals of a block's texels, padded.
-pub struct Texels {
-    pub positions: [Vec<f32>; 3],
-    normals: [Vec<f32>; 3],
-    count: usize,
-}
-
-impl Texels {
-    pub fn new(scene: &Scene, block: usize) -> Self {
-        let range = scene.blocks[block].texels.clone();
-        let padded = range.len().next_multiple_of(WIDEST);
-        let plane = |of: &[Vec3], c: usize| {
-            let mut plane: Vec<f32> = of[range.clone()].iter().map(|v| v[c]).collect();
-            plane.resize(padded, 0.0);
-            plane
-        };
-        Self {
-            positions: [0, 1, 2].map(|c| plane(&scene.texel_positions, c)),
-            normals: [0, 1, 2].map(|c| plane(&scene.texel_normals, c)),
-            count: range.len(),
-        }
-    }
-
-    pub fn planes(&self) -> TexelPlanes<'_> {
-        TexelPlanes {
-            positions: [0, 1, 2].map(|c| &self.positions[c][..]),
-            normals: [0, 1, 2].map(|c| &self.normals[c][..]),
-        }
+/// The texels of a block, by slot.
+pub fn texels(scene: &Scene, block: usize) -> TexelPlanes<'_> {
+    let slots = scene.layout.slots[scene.layout.rank[block] as usize].clone();
+    TexelPlanes {
+        positions: scene.surface.positions().block(slots.clone()),
+        normals: scene.surface.normals().block(slots),
     }
 }
 
@@ -78,7 +56,6 @@ pub fn beams(
 fn lit(
     level: SimdLevel,
     scene: &Scene,
-    texels: &[Texels],
     light: &PlacedLight,
     doors: &[f32],
     beams: &[Beam],
@@ -86,19 +63,28 @@ fn lit(
     let mut out = vec![Vec3::ZERO; scene.texel_count()];
     for beam in beams {
         let block = beam.block as usize;
-        let of_block = &texels[block];
+        let place = scene.layout.rank[block] as usize;
+        let of_block = texels(scene, block);
         let mut planes = [0, 1, 2].map(|_| vec![0.0; of_block.positions[0].len()]);
         let slices = planes.each_mut().map(|plane| &mut plane[..]);
         if beam.exact {
-            add_exact(scene, block, light, doors, slices);
+            add_exact(scene, place, light, doors, slices);
         } else {
-            add_beam(level, &of_block.planes(), light, beam, slices);
+            add_beam(level, &of_block, light, beam, slices);
         }
+        let folding = &scene.shapes[scene.blocks[block].shape_index].folding;
         for plane in &planes {
-            assert!(plane[of_block.count..].iter().all(|&e| e == 0.0), "padding");
+            let slots = plane.iter().zip(&folding.texel_of_slot);
+            let mut padding = slots.filter(|(_, texel)| **texel == u32::MAX);
+            assert!(padding.all(|(&e, _)| e == 0.0), "padding");
         }
-        for (k, texel) in scene.blocks[block].texels.clone().enumerate() {
-            out[texel] += Vec3::new(planes[0][k], planes[1][k], planes[2][k]);
+        for (texel, &slot) in scene.blocks[block]
+            .texels
+            .clone()
+            .zip(&folding.slot_of_texel)
+        {
+            let slot = slot as usize;
+            out[texel] += Vec3::new(planes[0][slot], planes[1][slot], planes[2][slot]);
         }
     }
     out
@@ -117,9 +103,6 @@ pub struct Tally {
 
 /// Compares every texel, light and level with the reference.
 pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally) {
-    let texels: Vec<Texels> = (0..scene.blocks.len())
-        .map(|block| Texels::new(scene, block))
-        .collect();
     let mut tracer = BeamTracer::new(scene);
     for &light in lights {
         let placed = place(scene, 0, light).expect("a sound light");
@@ -129,12 +112,12 @@ pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally
         let planes = beams.iter().map(|b| b.planes().len());
         tally.most_planes = planes.max().unwrap_or(0).max(tally.most_planes);
         let found: Vec<Vec<Vec3>> = SimdLevel::available()
-            .map(|level| lit(level, scene, &texels, &placed, doors, &beams))
+            .map(|level| lit(level, scene, &placed, doors, &beams))
             .collect();
         for (index, block) in scene.blocks.iter().enumerate() {
             for texel in block.texels.clone() {
-                let position = scene.texel_positions[texel].as_dvec3();
-                let normal = scene.texel_normals[texel].as_dvec3();
+                let position = scene.texel_position(texel).as_dvec3();
+                let normal = scene.texel_normal(texel).as_dvec3();
                 let at = |position: DVec3, normal: DVec3| {
                     let receiver = Receiver {
                         block: index,
