@@ -7,6 +7,7 @@
 //! Bits differ between levels, since they add in different orders and some fuse a product with a sum; each level gives
 //! the same bits on every machine that has it.
 
+pub mod folded;
 mod lanes;
 pub mod tiles;
 #[cfg(target_arch = "aarch64")]

@@ -10,7 +10,7 @@ mod transport;
 
 pub use folding::Folding;
 pub(crate) use shape::Operators;
-pub use shape::{Group, PackedShape, Tiled};
+pub use shape::{Group, PackedShape, RowTile, Tiled};
 pub use transport::{PackedTransport, TransportEntry, TransportPacker, TransportTile};
 
 use half::f16;

@@ -57,10 +57,9 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
         Coupling::Lightfield => [0; 3],
     };
     let layout = &scene.layout;
-    let shape_of_block = layout.shapes.iter().map(|&shape| shape as usize);
     let mut packer = TransportPacker::new(
         &scene.shapes,
-        shape_of_block.collect(),
+        layout,
         config.transport_storage,
         config.negligible,
     );

@@ -26,6 +26,26 @@ pub trait Lanes: Copy + Debug + Send + Sync + 'static {
     fn splat(self, x: f32) -> Self::V;
     fn load(self, from: &[f32]) -> Self::V;
     fn store(self, to: &mut [f32], v: Self::V);
+    /// [`Lanes::load`] of `from[at..]`.
+    ///
+    /// # Safety
+    /// `at + N` is at most the length.
+    #[allow(unsafe_code, reason = "see Safety")]
+    #[inline(always)]
+    unsafe fn load_unchecked(self, from: &[f32], at: usize) -> Self::V {
+        // SAFETY: the caller's promise.
+        self.load(unsafe { from.get_unchecked(at..at + Self::N) })
+    }
+    /// [`Lanes::store`] to `to[at..]`.
+    ///
+    /// # Safety
+    /// `at + N` is at most the length.
+    #[allow(unsafe_code, reason = "see Safety")]
+    #[inline(always)]
+    unsafe fn store_unchecked(self, to: &mut [f32], at: usize, v: Self::V) {
+        // SAFETY: the caller's promise.
+        self.store(unsafe { to.get_unchecked_mut(at..at + Self::N) }, v);
+    }
     /// Half-precision numbers, by their bits, as `f32`; infinities and NaN do not occur.
     fn load_f16(self, from: &[u16]) -> Self::V;
     fn load_i8(self, from: &[i8]) -> Self::V;

@@ -120,14 +120,18 @@ impl<E: tiles::Element> Kernel for Tile<'_, E> {
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> tiles::TileSums {
         let mut sums = [[0.5; tiles::TILE]; 3];
-        let x = tiles::Rgb::new(self.x);
+        let x = tiles::Rgb::new(self.x, self.x.len() / 3);
+        let columns = self.columns;
+        let panels = [self.panel];
+        let once = std::iter::once(tiles::Term { panels, columns, x });
         if self.is_half {
-            tiles::add_half_tile(l, self.panel, self.columns, x, &mut sums);
+            tiles::add_half_tile(l, once, &mut sums);
         } else {
             let mut twice = [[[0.25; tiles::TILE]; 3]; 2];
             let [first, second] = &mut twice;
-            tiles::add_two_tiles(l, [self.panel; 2], self.columns, x, [first, second]);
-            tiles::add_tile(l, self.panel, self.columns, x, &mut sums);
+            let panels = [self.panel; 2];
+            tiles::add_two_tiles(l, tiles::Term { panels, columns, x }, [first, second]);
+            tiles::add_tile(l, once, &mut sums);
             // The same panel three times; sums of columns may be taken in another order.
             for (pair, single) in twice[0].iter().zip(&sums) {
                 for (a, b) in pair.iter().zip(single) {
@@ -163,7 +167,7 @@ fn numbers(count: usize) -> Vec<f32> {
 #[test]
 fn tiles_are_products_at_every_level_for_every_number_of_columns() {
     for count in 0..11 {
-        let columns: Vec<u16> = (0..count).map(|k| (k * 5 % 12) as u16).collect();
+        let columns: Vec<u32> = (0..count).map(|k| (k * 5 % 12) as u32).collect();
         let mut lists = tiles::ColumnLists::default();
         let range = lists.push(columns.iter().copied());
         let x = numbers(36);
@@ -178,8 +182,8 @@ fn tiles_are_products_at_every_level_for_every_number_of_columns() {
                 });
                 for channel in 0..3 {
                     for row in 0..16 {
-                        let product = |(k, &column): (usize, &u16)| {
-                            let x = x[channel * 12 + usize::from(column)];
+                        let product = |(k, &column): (usize, &u32)| {
+                            let x = x[channel * 12 + column as usize];
                             f64::from(panel[k * rows + row]) * f64::from(x)
                         };
                         let sum: f64 = columns.iter().enumerate().map(product).sum();

@@ -25,13 +25,15 @@ pub const CHANNELS: usize = 3;
 
 /// A number as operators are stored.
 pub trait Element: Copy + Send + Sync + 'static {
-    /// Bytes of one.
-    const BYTES: usize = size_of::<Self>();
+    /// Whether loading takes more than a load.
+    const CONVERTED: bool = true;
     /// Loads `L::N` of them as `f32`, without scale.
     fn load<L: Lanes>(lanes: L, from: &[Self]) -> L::V;
 }
 
 impl Element for f32 {
+    const CONVERTED: bool = false;
+
     #[inline(always)]
     fn load<L: Lanes>(lanes: L, from: &[f32]) -> L::V {
         lanes.load(from)
@@ -53,7 +55,7 @@ impl Element for i8 {
     }
 }
 
-/// Right-hand sides: three vectors of equal length.
+/// Right-hand sides: number k of the channels is `values[k]`, `values[k + stride]` and `values[k + 2 stride]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Rgb<'a> {
     values: &'a [f32],
@@ -61,29 +63,22 @@ pub struct Rgb<'a> {
 }
 
 impl<'a> Rgb<'a> {
-    /// Red, then green, then blue, each a third of the slice.
-    pub fn new(values: &'a [f32]) -> Self {
-        Self {
-            values,
-            stride: values.len() / CHANNELS,
-        }
+    /// Vectors of `stride` numbers, red, green and blue; more of such triples may follow.
+    pub fn new(values: &'a [f32], stride: usize) -> Self {
+        Self { values, stride }
     }
 
-    /// Numbers a channel.
-    pub fn len(&self) -> usize {
-        self.stride
-    }
-
-    /// True without numbers.
-    pub fn is_empty(&self) -> bool {
-        self.stride == 0
+    /// Whether every index below `limit` has its three numbers.
+    #[inline(always)]
+    fn has(&self, limit: usize) -> bool {
+        limit == 0 || limit + (CHANNELS - 1) * self.stride <= self.values.len()
     }
 }
 
 /// Lists of columns that panels hold; all are checked once, when they are added.
 #[derive(Clone, Debug, Default)]
 pub struct ColumnLists {
-    indices: Vec<u16>,
+    indices: Vec<u32>,
     /// Above every index.
     limit: usize,
 }
@@ -91,17 +86,17 @@ pub struct ColumnLists {
 /// One of [`ColumnLists`].
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<'a> {
-    indices: &'a [u16],
+    indices: &'a [u32],
     limit: usize,
 }
 
 impl ColumnLists {
     /// Adds a list; [`ColumnLists::get`] takes the range that it returns.
-    pub fn push(&mut self, columns: impl IntoIterator<Item = u16>) -> Range<usize> {
+    pub fn push(&mut self, columns: impl IntoIterator<Item = u32>) -> Range<usize> {
         let start = self.indices.len();
         self.indices.extend(columns);
         let largest = self.indices[start..].iter().copied().max();
-        self.limit = self.limit.max(largest.map_or(0, |k| usize::from(k) + 1));
+        self.limit = self.limit.max(largest.map_or(0, |k| k as usize + 1));
         start..self.indices.len()
     }
 
@@ -132,7 +127,7 @@ impl ColumnLists {
 
 impl Columns<'_> {
     /// Their indices.
-    pub fn indices(&self) -> &[u16] {
+    pub fn indices(&self) -> &[u32] {
         self.indices
     }
 }
@@ -140,47 +135,57 @@ impl Columns<'_> {
 /// The sums of one tile: channel by channel, [`TILE`] rows each; a half tile uses the first [`HALF_TILE`].
 pub type TileSums = [[f32; TILE]; CHANNELS];
 
-/// `sums += panel * x[columns]`, for a tile of [`TILE`] rows whose columns are those that `columns` names.
+/// A panel of a tile's columns, and what they are multiplied by.
+#[derive(Clone, Copy, Debug)]
+pub struct Term<'a, E, const PANELS: usize = 1> {
+    /// Numbers of each tile, column after column.
+    pub panels: [&'a [E]; PANELS],
+    /// Which numbers of `x` the columns belong to.
+    pub columns: Columns<'a>,
+    /// The right-hand sides.
+    pub x: Rgb<'a>,
+}
+
+/// `sums += panel * x[columns]` over all terms, for a tile of [`TILE`] rows.
 ///
 /// # Panics
-/// If the panel does not have a tile of numbers for each column, or `x` is shorter than any of the lists allows.
+/// If a panel does not have a tile of numbers for each column, or `x` is shorter than any of the lists of columns allows.
 #[inline(always)]
-pub fn add_tile<L: Lanes, E: Element>(
+pub fn add_tile<'a, L: Lanes, E: Element>(
     l: L,
-    panel: &[E],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
+    terms: impl Iterator<Item = Term<'a, E>>,
     sums: &mut TileSums,
 ) {
-    let panels = [panel];
     match L::N {
-        4 => add_rows::<L, E, 1, 4, 1, TILE>(l, panels, columns, x, [sums]),
-        8 => add_rows::<L, E, 1, 2, 2, TILE>(l, panels, columns, x, [sums]),
-        16 => add_rows::<L, E, 1, 1, 4, TILE>(l, panels, columns, x, [sums]),
-        _ => add_rows_one_by_one::<L, E, TILE>(l, panel, columns, x, sums),
+        4 => add_rows::<L, E, 1, 4, 1, TILE>(l, terms, [sums]),
+        // What is converted on loading takes a register more, and with twelve sums one would live in memory.
+        8 if E::CONVERTED => add_rows::<L, E, 1, 2, 1, TILE>(l, terms, [sums]),
+        8 => add_rows::<L, E, 1, 2, 2, TILE>(l, terms, [sums]),
+        16 => add_rows::<L, E, 1, 1, 4, TILE>(l, terms, [sums]),
+        _ => add_rows_one_by_one::<L, E, TILE>(l, terms, sums),
     }
 }
 
-/// [`add_tile`] for two tiles with the same columns: half the loads of `x`.
+/// [`add_tile`] for two tiles with the same columns, and one term: half the loads of `x`.
 ///
 /// # Panics
 /// As [`add_tile`].
 #[inline(always)]
-pub fn add_two_tiles<L: Lanes, E: Element>(
-    l: L,
-    panels: [&[E]; 2],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
-    sums: [&mut TileSums; 2],
-) {
+pub fn add_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [&mut TileSums; 2]) {
+    let once = std::iter::once(term);
     match L::N {
-        8 => add_rows::<L, E, 2, 2, 1, TILE>(l, panels, columns, x, sums),
-        16 => add_rows::<L, E, 2, 1, 2, TILE>(l, panels, columns, x, sums),
+        8 => add_rows::<L, E, 2, 2, 1, TILE>(l, once, sums),
+        16 => add_rows::<L, E, 2, 1, 2, TILE>(l, once, sums),
         // Four lanes would need more registers than there are.
         _ => {
             let [first, second] = sums;
-            add_tile(l, panels[0], columns, x, first);
-            add_tile(l, panels[1], columns, x, second);
+            let Term { panels, columns, x } = term;
+            let half = |k: usize| {
+                let panels = [panels[k]];
+                std::iter::once(Term { panels, columns, x })
+            };
+            add_tile(l, half(0), first);
+            add_tile(l, half(1), second);
         }
     }
 }
@@ -190,26 +195,24 @@ pub fn add_two_tiles<L: Lanes, E: Element>(
 /// # Panics
 /// As [`add_tile`].
 #[inline(always)]
-pub fn add_half_tile<L: Lanes, E: Element>(
+pub fn add_half_tile<'a, L: Lanes, E: Element>(
     l: L,
-    panel: &[E],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
+    terms: impl Iterator<Item = Term<'a, E>>,
     sums: &mut TileSums,
 ) {
     let l = l.narrow();
-    let panels = [panel];
     match <L::Narrow as Lanes>::N {
-        4 => add_rows::<_, E, 1, 2, 2, HALF_TILE>(l, panels, columns, x, [sums]),
-        8 => add_rows::<_, E, 1, 1, 4, HALF_TILE>(l, panels, columns, x, [sums]),
-        _ => add_rows_one_by_one::<_, E, HALF_TILE>(l, panel, columns, x, sums),
+        4 => add_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, [sums]),
+        8 => add_rows::<_, E, 1, 1, 4, HALF_TILE>(l, terms, [sums]),
+        _ => add_rows_one_by_one::<_, E, HALF_TILE>(l, terms, sums),
     }
 }
 
 /// `VECTORS` vectors make the `ROWS` of each of `PANELS` panels; `SETS` columns go to sums of their own, so that enough
-/// products are under way at once to hide the time that each takes (twelve, for every level).
+/// products are under way at once to hide the time that each takes.
 #[inline(always)]
 fn add_rows<
+    'a,
     L: Lanes,
     E: Element,
     const PANELS: usize,
@@ -218,32 +221,35 @@ fn add_rows<
     const ROWS: usize,
 >(
     l: L,
-    panels: [&[E]; PANELS],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
+    terms: impl Iterator<Item = Term<'a, E, PANELS>>,
     sums: [&mut TileSums; PANELS],
 ) {
-    let count = columns.indices.len();
-    assert!(VECTORS * L::N == ROWS && columns.limit <= x.stride);
-    for panel in panels {
-        assert!(panel.len() >= count * ROWS);
-    }
+    assert_eq!(VECTORS * L::N, ROWS);
     let mut acc = [[[[l.splat(0.0); VECTORS]; CHANNELS]; PANELS]; SETS];
-    let whole = count / SETS * SETS;
-    let mut k = 0;
-    while k < whole {
-        for (set, acc) in acc.iter_mut().enumerate() {
-            // SAFETY: k + set < count, and all else was checked above.
-            unsafe {
-                add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k + set, x, acc)
-            };
+    for Term { panels, columns, x } in terms {
+        let count = columns.indices.len();
+        assert!(x.has(columns.limit));
+        for panel in panels {
+            assert!(panel.len() >= count * ROWS);
         }
-        k += SETS;
-    }
-    while k < count {
-        // SAFETY: as above.
-        unsafe { add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k, x, &mut acc[0]) };
-        k += 1;
+        let whole = count / SETS * SETS;
+        let mut k = 0;
+        while k < whole {
+            for (set, acc) in acc.iter_mut().enumerate() {
+                // SAFETY: k + set < count, and all else was checked above.
+                unsafe {
+                    add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k + set, x, acc);
+                }
+            }
+            k += SETS;
+        }
+        while k < count {
+            // SAFETY: as above.
+            unsafe {
+                add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k, x, &mut acc[0]);
+            }
+            k += 1;
+        }
     }
     for (panel, sums) in sums.into_iter().enumerate() {
         for channel in 0..CHANNELS {
@@ -264,7 +270,7 @@ fn add_rows<
 ///
 /// # Safety
 /// `k` is below the number of columns, each panel has `ROWS` numbers for each of them, `VECTORS` vectors make `ROWS`, and
-/// `x` is as long as the columns' limit.
+/// `x` has three numbers for every index below the columns' limit.
 #[inline(always)]
 unsafe fn add_column<
     L: Lanes,
@@ -280,9 +286,9 @@ unsafe fn add_column<
     x: Rgb<'_>,
     acc: &mut [[[L::V; VECTORS]; CHANNELS]; PANELS],
 ) {
-    // SAFETY: the caller's promises; `Rgb` has three times its stride.
+    // SAFETY: the caller's promises.
     let (red, green, blue) = unsafe {
-        let column = usize::from(*columns.indices.get_unchecked(k));
+        let column = *columns.indices.get_unchecked(k) as usize;
         let at = |channel: usize| *x.values.get_unchecked(channel * x.stride + column);
         (at(0), at(1), at(2))
     };
@@ -305,24 +311,25 @@ unsafe fn add_column<
 
 /// The reference: each sum in the order of the columns.
 #[inline(always)]
-fn add_rows_one_by_one<L: Lanes, E: Element, const ROWS: usize>(
+fn add_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
     l: L,
-    panel: &[E],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
+    terms: impl Iterator<Item = Term<'a, E>>,
     sums: &mut TileSums,
 ) {
-    assert!(L::N == 1 && panel.len() >= columns.indices.len() * ROWS);
-    assert!(columns.limit <= x.stride);
-    for (channel, sums) in sums.iter_mut().enumerate() {
-        let x = &x.values[channel * x.stride..];
-        for (row, sum) in sums[..ROWS].iter_mut().enumerate() {
-            let mut acc = l.splat(0.0);
-            for (k, &column) in columns.indices.iter().enumerate() {
-                let a = E::load(l, &panel[k * ROWS + row..]);
-                acc = l.mul_add(a, l.splat(x[usize::from(column)]), acc);
+    assert_eq!(L::N, 1);
+    for Term { panels, columns, x } in terms {
+        let panel = &panels[0][..columns.indices.len() * ROWS];
+        assert!(x.has(columns.limit));
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            let x = &x.values[channel * x.stride..];
+            for (row, sum) in sums[..ROWS].iter_mut().enumerate() {
+                let mut acc = l.splat(0.0);
+                for (k, &column) in columns.indices.iter().enumerate() {
+                    let a = E::load(l, &panel[k * ROWS + row..]);
+                    acc = l.mul_add(a, l.splat(x[column as usize]), acc);
+                }
+                *sum += l.sum(acc);
             }
-            *sum += l.sum(acc);
         }
     }
 }

@@ -1,11 +1,13 @@
 //! The two products of a pass, one block at a time.
 
-use crate::packed::{Folding, PackedShape, PackedTransport, Values};
+use crate::packed::{PackedShape, PackedTransport, TransportEntry, Values};
+use mrt_core::simd::folded::{Reflected, Unfolded, fold, unfold};
 use mrt_core::simd::tiles::{
-    CHANNELS, ColumnLists, Columns, DOT_ROWS, Element, Rgb, TILE, TileSums, add_half_tile,
+    CHANNELS, ColumnLists, Columns, DOT_ROWS, Element, Rgb, TILE, Term, TileSums, add_half_tile,
     add_tile, add_two_tiles, dot_rows,
 };
 use mrt_core::simd::{Kernel, Lanes, WIDEST};
+use std::ops::Range;
 
 /// Classes of a shape with three mirrors.
 const MAX_CLASSES: usize = 8;
@@ -25,7 +27,7 @@ impl Scratch {
     /// For blocks of so many slots, and so many coefficients a channel.
     pub(super) fn new(slots: usize, coefficients: usize) -> Self {
         let mut counting = ColumnLists::default();
-        counting.push((0..coefficients).map(|k| k as u16));
+        counting.push((0..coefficients).map(|k| k as u32));
         Self {
             folded: vec![0.0; CHANNELS * slots],
             scaled: vec![0.0; CHANNELS * coefficients],
@@ -64,10 +66,10 @@ impl Kernel for CoefficientsOf<'_> {
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) -> Sent {
         let sent = match self.shape.folding.mirrors {
-            0 => fold::<L, 1>(l, &mut self),
-            1 => fold::<L, 2>(l, &mut self),
-            2 => fold::<L, 4>(l, &mut self),
-            _ => fold::<L, 8>(l, &mut self),
+            0 => fold_block::<L, 1>(l, &mut self),
+            1 => fold_block::<L, 2>(l, &mut self),
+            2 => fold_block::<L, 4>(l, &mut self),
+            _ => fold_block::<L, 8>(l, &mut self),
         };
         match &self.shape.rows {
             Values::F32(rows) => coefficients(l, rows, &mut self),
@@ -78,66 +80,21 @@ impl Kernel for CoefficientsOf<'_> {
     }
 }
 
-/// Sums and differences of mirrored texels, each mirror in turn: the parts of every class from values at every element
-/// of the group, and values from parts.
 #[inline(always)]
-fn butterflies<L: Lanes, const GROUP: usize>(l: L, v: &mut [L::V; GROUP]) {
-    let mut step = 1;
-    while step < GROUP {
-        let mut k = 0;
-        while k < GROUP {
-            if k & step == 0 {
-                let (a, b) = (v[k], v[k | step]);
-                v[k] = l.add(a, b);
-                v[k | step] = l.sub(a, b);
-            }
-            k += 1;
-        }
-        step *= 2;
-    }
-}
-
-#[inline(always)]
-fn fold<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>) -> Sent {
-    let folding = &block.shape.folding;
-    let stride = folding.stride;
-    let weight = &folding.weight[..stride];
+fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>) -> Sent {
+    let weight = &block.shape.folding.weight[..];
+    let stride = weight.len();
     let mut sent = Sent::default();
     for channel in 0..CHANNELS {
-        let direct = &block.direct[channel][..GROUP * stride];
-        let albedo = &block.albedo[channel][..GROUP * stride];
-        let indirect = block.indirect.map(|i| &i[channel][..GROUP * stride]);
-        let emission = block.emission.map(|e| &e[channel][..GROUP * stride]);
-        let (mut all, mut fresh) = (l.splat(0.0), l.splat(0.0));
-        let mut orbit = 0;
-        while orbit < stride {
-            let mut v = [l.splat(0.0); GROUP];
-            let mut fresh_here = l.splat(0.0);
-            for (element, v) in v.iter_mut().enumerate() {
-                let at = element * stride + orbit;
-                let albedo = l.load(&albedo[at..at + L::N]);
-                let mut light = l.mul(albedo, l.load(&direct[at..at + L::N]));
-                if let Some(emission) = emission {
-                    light = l.add(light, l.load(&emission[at..at + L::N]));
-                }
-                fresh_here = l.add(fresh_here, light);
-                if let Some(indirect) = indirect {
-                    light = l.mul_add(albedo, l.load(&indirect[at..at + L::N]), light);
-                }
-                *v = light;
-            }
-            butterflies::<L, GROUP>(l, &mut v);
-            let weight = l.load(&weight[orbit..orbit + L::N]);
-            all = l.mul_add(v[0], weight, all);
-            fresh = l.mul_add(fresh_here, weight, fresh);
-            for (class, v) in v.into_iter().enumerate() {
-                let at = (class * CHANNELS + channel) * stride + orbit;
-                l.store(&mut block.scratch.folded[at..at + L::N], v);
-            }
-            orbit += L::N;
-        }
-        sent.all[channel] = f64::from(l.sum(all));
-        sent.fresh[channel] = f64::from(l.sum(fresh));
+        let light = Reflected {
+            direct: block.direct[channel],
+            indirect: block.indirect.map(|i| i[channel]),
+            albedo: block.albedo[channel],
+            emission: block.emission.map(|e| e[channel]),
+        };
+        let folded = &mut block.scratch.folded[channel * stride..];
+        let sums = fold::<L, GROUP>(l, light, weight, folded, CHANNELS * stride);
+        (sent.all[channel], sent.fresh[channel]) = (f64::from(sums[0]), f64::from(sums[1]));
     }
     sent
 }
@@ -165,8 +122,8 @@ fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut Coefficients
     }
 }
 
-/// Light from all blocks on the walls of one: `r = T_b->r b`, then irradiance from the joint basis.
-pub(super) struct IndirectOf<'a> {
+/// `r = T_b->r b` of one block, and its own coefficients.
+pub(super) struct ResponsesOf<'a> {
     /// Its place.
     pub block: usize,
     pub shape: &'a PackedShape,
@@ -179,7 +136,16 @@ pub(super) struct IndirectOf<'a> {
     pub scratch: &'a mut Scratch,
     /// Joint coefficients of this block.
     pub joint: &'a mut [f32],
-    /// Irradiance: what was there before is compared and replaced.
+}
+
+/// Irradiance of one block from its joint coefficients.
+pub(super) struct IndirectOf<'a> {
+    pub shape: &'a PackedShape,
+    pub joint: &'a [f32],
+    pub scratch: &'a mut Scratch,
+    /// Whether to find the largest change and irradiance; without, only whether there is light is known.
+    pub compare: bool,
+    /// Irradiance; what was there before is replaced.
     pub indirect: [&'a mut [f32]; CHANNELS],
 }
 
@@ -187,10 +153,24 @@ pub(super) struct IndirectOf<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Arrived {
     pub flux: Flux,
-    /// Largest change of irradiance, W/m².
+    /// Largest change of irradiance, W/m²; 0 if not compared.
     pub change: f32,
-    /// Largest irradiance, W/m².
+    /// Largest irradiance, W/m²; if not compared, a number that is 0 where that is.
     pub peak: f32,
+}
+
+impl Kernel for ResponsesOf<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, l: L) {
+        match &self.transport.values {
+            Some(Values::F32(values)) => arrive(l, values, &mut self),
+            Some(Values::F16(values)) => arrive(l, values, &mut self),
+            Some(Values::Int8(values)) => arrive(l, values, &mut self),
+            None => {}
+        }
+    }
 }
 
 impl Kernel for IndirectOf<'_> {
@@ -198,12 +178,6 @@ impl Kernel for IndirectOf<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) -> Arrived {
-        match &self.transport.values {
-            Some(Values::F32(values)) => arrive(l, values, &mut self),
-            Some(Values::F16(values)) => arrive(l, values, &mut self),
-            Some(Values::Int8(values)) => arrive(l, values, &mut self),
-            None => {}
-        }
         match (&self.shape.joint, self.shape.folding.mirrors) {
             (Values::F32(joint), 0) => expand::<L, f32, 1>(l, joint, &mut self),
             (Values::F32(joint), 1) => expand::<L, f32, 2>(l, joint, &mut self),
@@ -222,70 +196,108 @@ impl Kernel for IndirectOf<'_> {
 }
 
 #[inline(always)]
-fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut IndirectOf<'_>) {
+fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
     let transport = block.transport;
     let stride = block.coefficients.len() / block.has_coefficients.len().max(1);
+    let mode_stride = stride / CHANNELS;
     let place = block.joint.len() / CHANNELS;
     let own = &block.coefficients[block.block * stride..(block.block + 1) * stride];
     let tiles = transport.tiles_of_block[block.block].clone();
-    for (k, tile) in (tiles.start..tiles.end).enumerate() {
-        let tile = &transport.tiles[tile as usize];
-        let rows = usize::from(tile.rows);
+    let tiles = &transport.tiles[tiles.start as usize..tiles.end as usize];
+    for (tile, row_tile) in tiles.iter().zip(&block.shape.row_tiles) {
+        let rows = usize::from(row_tile.height);
         let mut sums: TileSums = [[0.0; TILE]; CHANNELS];
-        for entry in tile.entries.start..tile.entries.end {
-            let entry = &transport.entries[entry as usize];
-            let source = entry.source as usize;
-            if !block.has_coefficients[source] {
+        let entries = &transport.entries[tile.entries.start as usize..tile.entries.end as usize];
+        // Gated ones come first.
+        let steady = if transport.column_scales.is_empty() {
+            entries.partition_point(|entry| entry.gate != u32::MAX)
+        } else {
+            entries.len()
+        };
+        for entry in &entries[..steady] {
+            let factor = match entry.gate {
+                u32::MAX => 1.0,
+                gate => block.gate_values[gate as usize],
+            };
+            if factor == 0.0 || !block.has_coefficients[entry.source as usize] {
                 continue;
             }
-            let mut factor = 1.0;
-            if entry.gate != u32::MAX {
-                factor = block.gate_values[entry.gate as usize];
-                if factor == 0.0 {
-                    continue;
-                }
-            }
-            let x = &block.coefficients[source * stride..(source + 1) * stride];
-            let (start, end) = (entry.columns.start as usize, entry.columns.end as usize);
-            let columns = transport.columns.get(start..end);
-            let panel = &values[entry.start as usize..][..(end - start) * rows];
-            if factor == 1.0 && transport.column_scales.is_empty() {
-                add_panel(l, panel, columns, Rgb::new(x), rows, &mut sums);
-            } else {
-                let scales = transport.column_scales.get(start..end);
-                let scratch = &mut *block.scratch;
-                scale_columns(columns, x, factor, scales, &mut scratch.scaled);
-                let columns = scratch.counting.get(0..end - start);
-                let x = Rgb::new(&scratch.scaled);
-                add_panel(l, panel, columns, x, rows, &mut sums);
-            }
+            let columns = entry.columns.start as usize..entry.columns.end as usize;
+            let scales = transport.column_scales.get(columns.clone());
+            let scratch = &mut *block.scratch;
+            let indices = transport.columns.get(columns.clone());
+            let x = &block.coefficients[..];
+            scale_columns(indices, x, mode_stride, factor, scales, &mut scratch.scaled);
+            let place = scratch.scaled.len() / CHANNELS;
+            let scaled = Term {
+                panels: [&values[entry.start as usize..][..columns.len() * rows]],
+                columns: scratch.counting.get(0..columns.len()),
+                x: Rgb::new(&scratch.scaled, place),
+            };
+            add_terms(l, std::iter::once(scaled), rows, &mut sums);
         }
-        let modes = &block.shape.row_order[k * TILE..];
+        let runs = LitRuns {
+            entries: &entries[steady..],
+            has_coefficients: block.has_coefficients,
+        };
+        let x = Rgb::new(block.coefficients, mode_stride);
+        let lit = runs.map(|(columns, start)| Term {
+            panels: [&values[start..start + columns.len() * rows]],
+            columns: transport.columns.get(columns),
+            x,
+        });
+        add_terms(l, lit, rows, &mut sums);
+        let first = usize::from(row_tile.start);
+        let modes = &block.shape.row_order[first..first + usize::from(row_tile.count)];
         for (channel, sums) in sums.iter().enumerate() {
             let joint = &mut block.joint[channel * place..(channel + 1) * place];
-            let own = &own[channel * (stride / CHANNELS)..][..block.shape.modes];
-            for (&mode, &sum) in modes.iter().zip(&sums[..rows]) {
+            let own = &own[channel * mode_stride..][..block.shape.modes];
+            for (&mode, &sum) in modes.iter().zip(sums) {
                 let mode = usize::from(mode);
+                let sum = sum * (tile.scale / block.shape.row_units[mode]);
                 // The first joint modes are the block's own.
-                joint[mode] = sum * tile.scale + own.get(mode).copied().unwrap_or(0.0);
+                joint[mode] = sum + own.get(mode).copied().unwrap_or(0.0);
             }
         }
     }
 }
 
+/// Runs of entries whose sources have light: their columns and numbers stand side by side, and one long product has no
+/// branch that the machine guesses wrong, where many short ones have two each.
+struct LitRuns<'a> {
+    entries: &'a [TransportEntry],
+    has_coefficients: &'a [bool],
+}
+
+impl Iterator for LitRuns<'_> {
+    /// Columns, and the first number.
+    type Item = (Range<usize>, usize);
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        let is_lit = |entry: &TransportEntry| self.has_coefficients[entry.source as usize];
+        let dark = self.entries.iter().take_while(|entry| !is_lit(entry));
+        let rest = &self.entries[dark.count()..];
+        let lit = rest.iter().take_while(|entry| is_lit(entry)).count();
+        let (run, rest) = rest.split_at(lit);
+        self.entries = rest;
+        let (first, last) = (run.first()?, run.last()?);
+        let columns = first.columns.start as usize..last.columns.end as usize;
+        Some((columns, first.start as usize))
+    }
+}
+
 #[inline(always)]
-fn add_panel<L: Lanes, E: Element>(
+fn add_terms<'a, L: Lanes, E: Element>(
     l: L,
-    panel: &[E],
-    columns: Columns<'_>,
-    x: Rgb<'_>,
+    terms: impl Iterator<Item = Term<'a, E>>,
     rows: usize,
     sums: &mut TileSums,
 ) {
     if rows == TILE {
-        add_tile(l, panel, columns, x, sums);
+        add_tile(l, terms, sums);
     } else {
-        add_half_tile(l, panel, columns, x, sums);
+        add_half_tile(l, terms, sums);
     }
 }
 
@@ -294,17 +306,18 @@ fn add_panel<L: Lanes, E: Element>(
 fn scale_columns(
     columns: Columns<'_>,
     x: &[f32],
+    stride: usize,
     factor: f32,
     scales: Option<&[f32]>,
     out: &mut [f32],
 ) {
-    let (stride, place) = (x.len() / CHANNELS, out.len() / CHANNELS);
+    let place = out.len() / CHANNELS;
     for channel in 0..CHANNELS {
-        let x = &x[channel * stride..(channel + 1) * stride];
+        let x = &x[channel * stride..];
         let out = &mut out[channel * place..(channel + 1) * place];
         for (k, &column) in columns.indices().iter().enumerate() {
             let scale = scales.and_then(|scales| scales.get(k)).unwrap_or(&1.0);
-            out[k] = x[usize::from(column)] * factor * scale;
+            out[k] = x[column as usize] * factor * scale;
         }
     }
 }
@@ -318,8 +331,9 @@ fn expand<L: Lanes, E: Element, const GROUP: usize>(
     let shape = block.shape;
     let stride = shape.folding.stride;
     let x = scaled_joint(shape, block.joint, block.scratch);
-    let x = Rgb::new(x);
-    let mut arrived = Partial::new(l);
+    let x = Rgb::new(x, x.len() / CHANNELS);
+    let weight = &shape.folding.weight[..];
+    let mut found = Unfolded::new(l);
     let a_tile = TILE * shape.joint_modes;
     let mut sums = [[[[0.0f32; TILE]; CHANNELS]; 2]; MAX_CLASSES];
     let mut tile = 0;
@@ -334,26 +348,40 @@ fn expand<L: Lanes, E: Element, const GROUP: usize>(
             let panel = &joint[at..at + size];
             if pair {
                 let next = &joint[at + a_tile..at + a_tile + size];
-                add_two_tiles(l, [panel, next], columns, x, [first, second]);
+                let panels = [panel, next];
+                add_two_tiles(l, Term { panels, columns, x }, [first, second]);
             } else {
-                add_tile(l, panel, columns, x, first);
+                let panels = [panel];
+                add_tile(l, std::iter::once(Term { panels, columns, x }), first);
             }
             at += size;
         }
         for half in 0..1 + usize::from(pair) {
-            unfold::<L, GROUP>(
-                l,
-                &sums,
-                half,
-                (tile + half) * TILE,
-                &shape.folding,
-                &mut block.indirect,
-                &mut arrived,
-            );
+            let mut classes = [&sums[0][half]; GROUP];
+            for (class, sums) in classes.iter_mut().zip(&sums) {
+                *class = &sums[half];
+            }
+            let (first, out) = ((tile + half) * TILE, &mut block.indirect);
+            if block.compare {
+                unfold::<L, GROUP, true>(l, classes, first, weight, out, &mut found);
+            } else {
+                unfold::<L, GROUP, false>(l, classes, first, weight, out, &mut found);
+            }
         }
         tile += 1 + usize::from(pair);
     }
-    arrived.total(l)
+    let flux = [found.sum(l, 0), found.sum(l, 1), found.sum(l, 2)];
+    let [change, peak] = if block.compare {
+        found.change_and_peak(l)
+    } else {
+        // Nobody asks but whether there is light.
+        [0.0, flux[0].max(flux[1]).max(flux[2])]
+    };
+    Arrived {
+        flux: flux.map(f64::from),
+        change,
+        peak,
+    }
 }
 
 /// Joint coefficients times the scales of a packed basis.
@@ -374,79 +402,6 @@ pub(super) fn scaled_joint<'a>(
         }
     }
     &scratch.scaled[..joint.len()]
-}
-
-/// [`Arrived`], by lane.
-struct Partial<L: Lanes> {
-    flux: [L::V; CHANNELS],
-    change: L::V,
-    peak: L::V,
-}
-
-impl<L: Lanes> Partial<L> {
-    #[inline(always)]
-    fn new(l: L) -> Self {
-        Self {
-            flux: [l.splat(0.0); CHANNELS],
-            change: l.splat(0.0),
-            peak: l.splat(0.0),
-        }
-    }
-
-    #[inline(always)]
-    fn total(self, l: L) -> Arrived {
-        let [red, green, blue] = self.flux;
-        Arrived {
-            flux: [
-                f64::from(l.sum(red)),
-                f64::from(l.sum(green)),
-                f64::from(l.sum(blue)),
-            ],
-            change: l.largest(self.change),
-            peak: l.largest(self.peak),
-        }
-    }
-}
-
-/// Irradiance at the texels of a tile of orbits. Truncated bases leave small negative values; they end here, once, on
-/// the final sum.
-#[inline(always)]
-fn unfold<L: Lanes, const GROUP: usize>(
-    l: L,
-    sums: &[[TileSums; 2]; MAX_CLASSES],
-    half: usize,
-    first: usize,
-    folding: &Folding,
-    indirect: &mut [&mut [f32]; CHANNELS],
-    arrived: &mut Partial<L>,
-) {
-    let stride = folding.stride;
-    let zero = l.splat(0.0);
-    for channel in 0..CHANNELS {
-        let out = &mut indirect[channel][..GROUP * stride];
-        let mut lane = 0;
-        while lane < TILE {
-            let mut v = [zero; GROUP];
-            for (class, v) in v.iter_mut().enumerate() {
-                *v = l.load(&sums[class][half][channel][lane..lane + L::N]);
-            }
-            butterflies::<L, GROUP>(l, &mut v);
-            let mut sum = zero;
-            for (element, v) in v.into_iter().enumerate() {
-                let at = element * stride + first + lane;
-                let out = &mut out[at..at + L::N];
-                let now = l.max(v, zero);
-                let change = l.abs(l.sub(now, l.load(out)));
-                l.store(out, now);
-                arrived.change = l.max(change, arrived.change);
-                arrived.peak = l.max(now, arrived.peak);
-                sum = l.add(sum, now);
-            }
-            let weight = l.load(&folding.weight[first + lane..first + lane + L::N]);
-            arrived.flux[channel] = l.mul_add(sum, weight, arrived.flux[channel]);
-            lane += L::N;
-        }
-    }
 }
 
 /// A tiled basis times joint coefficients: row after row, channel by channel.
@@ -497,11 +452,13 @@ fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
         let [first, second] = &mut sums;
         let pair = row + TILE < job.rows;
         let tile = row / TILE;
+        let x = Rgb::new(x, x.len() / CHANNELS);
         if pair {
             let panels = [panel(tile), panel(tile + 1)];
-            add_two_tiles(l, panels, columns, Rgb::new(x), [first, second]);
+            add_two_tiles(l, Term { panels, columns, x }, [first, second]);
         } else {
-            add_tile(l, panel(tile), columns, Rgb::new(x), first);
+            let panels = [panel(tile)];
+            add_tile(l, std::iter::once(Term { panels, columns, x }), first);
         }
         for sums in sums.iter().take(1 + usize::from(pair)) {
             let height = TILE.min(job.rows - row);

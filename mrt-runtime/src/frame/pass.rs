@@ -1,7 +1,7 @@
 //! Bounces: which blocks take part, and the two stages of a pass over them.
 
 use super::blocks::{BlockState, Blocks};
-use super::kernels::{CoefficientsOf, IndirectOf, Scratch, Sent};
+use super::kernels::{CoefficientsOf, IndirectOf, ResponsesOf, Scratch, Sent};
 use super::limit::limit_flux;
 use super::{Bounces, Frame, MAX_PASSES};
 use crate::executor::{run_parts, task_count};
@@ -127,6 +127,8 @@ impl Frame {
             blocks.targets.push(block);
         }
         blocks.targets.sort_unstable();
+        self.update_responses(scene);
+        let after_responses = Instant::now();
         self.update_indirect(scene);
         let blocks = &mut self.blocks;
         let mut change = 0.0f32;
@@ -154,7 +156,8 @@ impl Frame {
         });
         self.blocks.forget_dark();
         self.times.coefficients += after_coefficients - start;
-        self.times.indirect += after_coefficients.elapsed();
+        self.times.responses += after_responses - after_coefficients;
+        self.times.indirect += after_responses.elapsed();
         match (peak > 0.0, reflects_indirect) {
             (false, _) => 0.0,
             (true, false) => 1.0,
@@ -175,16 +178,23 @@ impl Frame {
             has_coefficients,
             ..
         } = &mut self.blocks;
-        let tasks = task_count(executor, sources.len());
-        let parts = Parts {
-            list: sources,
-            tasks,
-            next: 0,
-            coefficients: Cut::new(&mut self.coefficients, size),
-            flags: Cut::new(has_coefficients, 1),
-            state: Cut::new(state, 1),
-            scratch: self.scratch.iter_mut(),
-        };
+        let (list, tasks) = (&*sources, task_count(executor, sources.len()));
+        let mut coefficients = Cut::new(&mut self.coefficients, size);
+        let mut flags = Cut::new(has_coefficients, 1);
+        let mut state = Cut::new(state, 1);
+        let mut scratch = self.scratch.iter_mut();
+        let parts = (0..tasks).map_while(|k| {
+            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
+            let span = span(list);
+            Some(Part {
+                list,
+                first: span.start,
+                coefficients: coefficients.take(span.clone()),
+                flags: flags.take(span.clone()),
+                state: state.take(span),
+                scratch: scratch.next()?,
+            })
+        });
         run_parts(executor, parts, |part: Part<'_>| {
             for &block in part.list {
                 let place = block as usize;
@@ -215,47 +225,74 @@ impl Frame {
         });
     }
 
-    /// Indirect light of the targets.
-    fn update_indirect(&mut self, scene: &Scene) {
+    /// Joint coefficients of the targets.
+    fn update_responses(&mut self, scene: &Scene) {
         let executor = &*self.config.executor;
         let level = self.config.simd;
         let layout = &*self.layout;
         let (coefficients, gate_values) = (&self.coefficients, &self.gate_values);
         let size = 3 * layout.joint_stride;
-        let Blocks {
-            targets,
-            state,
-            has_coefficients,
-            ..
-        } = &mut self.blocks;
-        let has_coefficients = &*has_coefficients;
-        let tasks = task_count(executor, targets.len());
-        let parts = TargetParts {
-            list: targets,
-            slots: &layout.slots,
-            tasks,
-            next: 0,
-            joint: Cut::new(&mut self.joint, size),
-            state: Cut::new(state, 1),
-            planes: CutPlanes::new(&mut self.indirect),
-            scratch: self.scratch.iter_mut(),
-        };
-        run_parts(executor, parts, |mut part: TargetPart<'_>| {
-            for &block in part.list {
+        let (list, has_coefficients) = (&self.blocks.targets, &self.blocks.has_coefficients);
+        let tasks = task_count(executor, list.len());
+        let mut joint = Cut::new(&mut self.joint, size);
+        let mut scratch = self.scratch.iter_mut();
+        let parts = (0..tasks).map_while(|k| {
+            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
+            Some((list, joint.take(span(list)), scratch.next()?))
+        });
+        run_parts(executor, parts, |(list, joint, scratch)| {
+            let first = span(list).start;
+            for &block in list {
                 let place = block as usize;
-                let at = place - part.first;
-                let slots = layout.slots[place].clone();
-                let slots = slots.start - part.first_slot..slots.end - part.first_slot;
-                let [red, green, blue] = &mut part.planes;
-                part.state[at].arrives = level.run(IndirectOf {
+                let at = place - first;
+                level.run(ResponsesOf {
                     block: place,
                     shape: &scene.shapes[layout.shapes[place] as usize],
                     transport: &scene.transport,
                     coefficients,
                     has_coefficients,
                     gate_values,
-                    scratch: part.scratch,
-                    joint: &mut part.joint[at * size..(at + 1) * size],
+                    scratch,
+                    joint: &mut joint[at * size..(at + 1) * size],
+                });
+            }
+        });
+    }
+
+    /// Indirect light of the targets.
+    fn update_indirect(&mut self, scene: &Scene) {
+        let executor = &*self.config.executor;
+        let level = self.config.simd;
+        let layout = &*self.layout;
+        let joint = &self.joint;
+        let size = 3 * layout.joint_stride;
+        // After one bounce nobody asks what changed.
+        let compare = self.blocks.kept != Kept::Once;
+        let Blocks { targets, state, .. } = &mut self.blocks;
+        let (list, tasks) = (&*targets, task_count(executor, targets.len()));
+        let mut state = Cut::new(state, 1);
+        let mut planes = CutPlanes::new(&mut self.indirect);
+        let mut scratch = self.scratch.iter_mut();
+        let parts = (0..tasks).map_while(|k| {
+            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
+            let span = span(list);
+            let slots = layout.slots[span.start].start..layout.slots[span.end - 1].end;
+            let (state, planes) = (state.take(span), planes.take(slots));
+            Some((list, state, planes, scratch.next()?))
+        });
+        run_parts(executor, parts, |(list, state, planes, scratch)| {
+            let first = span(list).start;
+            let first_slot = layout.slots[first].start;
+            let [red, green, blue] = planes;
+            for &block in list {
+                let place = block as usize;
+                let slots = layout.slots[place].clone();
+                let slots = slots.start - first_slot..slots.end - first_slot;
+                state[place - first].arrives = level.run(IndirectOf {
+                    shape: &scene.shapes[layout.shapes[place] as usize],
+                    joint: &joint[place * size..(place + 1) * size],
+                    scratch,
+                    compare,
                     indirect: [
                         &mut red[slots.clone()],
                         &mut green[slots.clone()],
@@ -335,74 +372,4 @@ struct Part<'a> {
     flags: &'a mut [bool],
     state: &'a mut [BlockState],
     scratch: &'a mut Scratch,
-}
-
-struct Parts<'a> {
-    list: &'a [u32],
-    tasks: usize,
-    next: usize,
-    coefficients: Cut<'a, f32>,
-    flags: Cut<'a, bool>,
-    state: Cut<'a, BlockState>,
-    scratch: std::slice::IterMut<'a, Scratch>,
-}
-
-impl<'a> Iterator for Parts<'a> {
-    type Item = Part<'a>;
-
-    fn next(&mut self) -> Option<Part<'a>> {
-        let list = part_of(self.list, self.tasks, self.next).filter(|list| !list.is_empty())?;
-        self.next += 1;
-        let span = span(list);
-        Some(Part {
-            list,
-            first: span.start,
-            coefficients: self.coefficients.take(span.clone()),
-            flags: self.flags.take(span.clone()),
-            state: self.state.take(span),
-            scratch: self.scratch.next()?,
-        })
-    }
-}
-
-/// Work on indirect light for one task.
-struct TargetPart<'a> {
-    list: &'a [u32],
-    first: usize,
-    first_slot: usize,
-    joint: &'a mut [f32],
-    state: &'a mut [BlockState],
-    planes: [&'a mut [f32]; 3],
-    scratch: &'a mut Scratch,
-}
-
-struct TargetParts<'a> {
-    list: &'a [u32],
-    slots: &'a [std::ops::Range<usize>],
-    tasks: usize,
-    next: usize,
-    joint: Cut<'a, f32>,
-    state: Cut<'a, BlockState>,
-    planes: CutPlanes<'a>,
-    scratch: std::slice::IterMut<'a, Scratch>,
-}
-
-impl<'a> Iterator for TargetParts<'a> {
-    type Item = TargetPart<'a>;
-
-    fn next(&mut self) -> Option<TargetPart<'a>> {
-        let list = part_of(self.list, self.tasks, self.next).filter(|list| !list.is_empty())?;
-        self.next += 1;
-        let span = span(list);
-        let slots = self.slots[span.start].start..self.slots[span.end - 1].end;
-        Some(TargetPart {
-            list,
-            first: span.start,
-            first_slot: slots.start,
-            joint: self.joint.take(span.clone()),
-            state: self.state.take(span),
-            planes: self.planes.take(slots),
-            scratch: self.scratch.next()?,
-        })
-    }
 }

@@ -2,6 +2,7 @@
 
 use crate::mirrors::{mirrors, texel_permutation};
 use crate::shape::Shape;
+use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::Matrix;
 use mrt_core::simd::WIDEST;
 
@@ -19,6 +20,8 @@ const SYMMETRY_TOLERANCE: f32 = 1e-6;
 pub struct Folding {
     /// Number of mirrors, 0 to 3.
     pub mirrors: usize,
+    /// Which of them exchanges floor and ceiling, if one does.
+    pub up_mirror: Option<usize>,
     /// Orbits, rounded up to a multiple of [`WIDEST`].
     pub stride: usize,
     /// By texel in the shape's order.
@@ -53,6 +56,7 @@ impl Folding {
             joint: vec![0; joint.columns()],
         };
         let mut permutations: Vec<Vec<u32>> = Vec::new();
+        let mut up_mirror = None;
         let candidates = if shape.tube().is_some() {
             Vec::new()
         } else {
@@ -80,10 +84,17 @@ impl Folding {
                 modes.for_each(|(class, is_odd)| *class |= odd(is_odd));
                 let modes = classes.joint.iter_mut().zip(of_joint);
                 modes.for_each(|(class, is_odd)| *class |= odd(is_odd));
+                if map == CubeSymmetry::mirror(1) {
+                    up_mirror = Some(permutations.len());
+                }
                 permutations.push(permutation);
             }
         }
-        (Self::by_mirrors(texels, &permutations, areas), classes)
+        let folding = Self {
+            up_mirror,
+            ..Self::by_mirrors(texels, &permutations, areas)
+        };
+        (folding, classes)
     }
 
     fn by_mirrors(texels: usize, permutations: &[Vec<u32>], areas: &[f32]) -> Self {
@@ -106,6 +117,7 @@ impl Folding {
         let stride = firsts.len().next_multiple_of(WIDEST);
         let mut folding = Self {
             mirrors: permutations.len(),
+            up_mirror: None,
             stride,
             slot_of_texel: vec![u32::MAX; texels],
             texel_of_slot: vec![u32::MAX; elements * stride],

@@ -4,7 +4,7 @@ use super::Values;
 use super::folding::{Classes, Folding};
 use crate::shape::Shape;
 use mrt_core::matrix::Matrix;
-use mrt_core::simd::tiles::{ColumnLists, DOT_ROWS, TILE};
+use mrt_core::simd::tiles::{ColumnLists, DOT_ROWS, HALF_TILE, TILE};
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
@@ -27,8 +27,14 @@ pub struct PackedShape {
     pub(crate) joint_classes: Vec<Range<usize>>,
     /// What coefficients are multiplied by, by joint mode; empty if by 1.
     pub(crate) joint_scales: Vec<f32>,
-    /// By joint mode: the order in which responses are computed, modes of one class together.
+    /// The order in which responses are computed, modes of one class together, and tiles of it: light that goes from
+    /// block to block keeps its parity under the mirrors that the blocks share, and then half of a tile's columns or more
+    /// are zero.
     pub(crate) row_order: Vec<u16>,
+    pub(crate) row_tiles: Vec<RowTile>,
+    /// By joint mode: a power of two near the size of its light. Responses are stored in such units, so that strong modes
+    /// do not take all the digits.
+    pub(crate) row_units: Vec<f32>,
     /// Size of the light of each joint mode, and of the light that makes each coefficient.
     pub(crate) joint_norms: Vec<f32>,
     pub(crate) coefficient_norms: Vec<f32>,
@@ -36,6 +42,17 @@ pub struct PackedShape {
     pub(crate) probes: Tiled,
     /// Vector irradiance, coefficient by coefficient and in that texel by texel.
     pub(crate) vector: Tiled,
+}
+
+/// Some joint modes that are computed together.
+#[derive(Clone, Copy, Debug)]
+pub struct RowTile {
+    /// The first of them in the order of rows.
+    pub start: u16,
+    /// How many.
+    pub count: u8,
+    /// Rows of the tile: [`TILE`], or [`HALF_TILE`].
+    pub height: u8,
 }
 
 /// Up to [`DOT_ROWS`] modes of one class.
@@ -86,7 +103,7 @@ impl Tiled {
             }
         }
         let mut lists = ColumnLists::default();
-        lists.push((0..columns).map(|j| j as u16));
+        lists.push((0..columns).map(|j| j as u32));
         Self {
             rows,
             values,
@@ -134,7 +151,7 @@ impl PackedShape {
             modes.filter_map(move |(&c, mode)| (usize::from(c) == class).then_some(mode))
         };
         let joint_classes: Vec<Range<usize>> = (0..folding.elements())
-            .map(|class| lists.push(of_class(class)))
+            .map(|class| lists.push(of_class(class).map(u32::from)))
             .collect();
         let scales: Vec<f32> = (0..j.columns())
             .map(|mode| {
@@ -154,12 +171,23 @@ impl PackedShape {
                 }
             }
         }
+        // Levels are flat more often than not: blocks on one floor share the mirror between floor and ceiling.
+        let is_odd = |mode: u16| {
+            let class = classes.joint[usize::from(mode)];
+            folding.up_mirror.is_some_and(|k| class >> k & 1 == 1)
+        };
         let mut row_order: Vec<u16> = (0..j.columns() as u16).collect();
-        row_order.sort_by_key(|&mode| (classes.joint[usize::from(mode)], mode));
+        row_order.sort_by_key(|&mode| (is_odd(mode), classes.joint[usize::from(mode)], mode));
+        let even = row_order.partition_point(|&mode| !is_odd(mode));
+        let row_tiles = row_tiles(0..even).chain(row_tiles(even..row_order.len()));
+        let row_tiles = row_tiles.collect();
         let norm =
             |values: &mut dyn Iterator<Item = f32>| values.map(|x| x * x).sum::<f32>().sqrt();
         let coefficients = operators.probe_basis.rows() / SH_COEFFICIENTS.max(1);
         let texels = j.rows();
+        let joint_norms: Vec<f32> = (0..j.columns())
+            .map(|mode| norm(&mut j.column(mode).iter().copied()))
+            .collect();
         Self {
             modes: t.rows(),
             joint_modes: j.columns(),
@@ -168,9 +196,8 @@ impl PackedShape {
             joint,
             joint_columns: lists,
             joint_classes,
-            joint_norms: (0..j.columns())
-                .map(|mode| norm(&mut j.column(mode).iter().copied()))
-                .collect(),
+            row_units: joint_norms.iter().map(|&n| power_of_two(n)).collect(),
+            joint_norms,
             coefficient_norms: (0..t.rows())
                 .map(|mode| norm(&mut (0..texels).map(|texel| t[(mode, texel)])))
                 .collect(),
@@ -180,6 +207,7 @@ impl PackedShape {
                 scales
             },
             row_order,
+            row_tiles,
             probes: Tiled::new(
                 operators.probe_basis,
                 operators.probe_basis.rows(),
@@ -213,6 +241,26 @@ impl PackedShape {
         let orbits = orbits.count();
         [3 * orbits * self.modes, 3 * orbits * self.joint_modes]
     }
+}
+
+/// Tiles of rows that belong together; the last is a half one if that is enough.
+fn row_tiles(rows: Range<usize>) -> impl Iterator<Item = RowTile> {
+    rows.clone().step_by(TILE).map(move |start| {
+        let count = TILE.min(rows.end - start);
+        RowTile {
+            start: start as u16,
+            count: count as u8,
+            height: if count <= HALF_TILE { HALF_TILE } else { TILE } as u8,
+        }
+    })
+}
+
+/// The largest power of two that is not above a number; 1 for what is no light.
+fn power_of_two(x: f32) -> f32 {
+    if x < 1e-30 {
+        return 1.0;
+    }
+    f32::from_bits(x.to_bits() & 0x7f80_0000)
 }
 
 /// SH coefficients of a probe.

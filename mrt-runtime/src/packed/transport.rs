@@ -1,8 +1,9 @@
 //! `T_b->r` by where light arrives, without what is zero or negligible.
 
 use super::{PackedShape, Values};
+use crate::scene::Layout;
 use mrt_core::matrix::Matrix;
-use mrt_core::simd::tiles::{ColumnLists, HALF_TILE, TILE};
+use mrt_core::simd::tiles::ColumnLists;
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
@@ -14,6 +15,7 @@ pub struct PackedTransport {
     pub(crate) tiles_of_block: Vec<Range<u32>>,
     pub(crate) tiles: Vec<TransportTile>,
     pub(crate) entries: Vec<TransportEntry>,
+    /// Where coefficients stand among those of all blocks.
     pub(crate) columns: ColumnLists,
     /// One a column, for `int8` only.
     pub(crate) column_scales: Vec<f32>,
@@ -28,11 +30,9 @@ pub struct PackedTransport {
     multiply_adds: usize,
 }
 
-/// Some joint modes of one block.
+/// What arrives in one [`RowTile`](super::RowTile) of a block.
 #[derive(Clone, Debug)]
 pub struct TransportTile {
-    /// 16 rows or 8; tile k of a block has the modes from 16 k on, in the order of [`PackedShape`].
-    pub(crate) rows: u8,
     pub(crate) entries: Range<u32>,
     /// What sums are multiplied by.
     pub(crate) scale: f32,
@@ -56,6 +56,8 @@ pub struct TransportPacker<'a> {
     shapes: &'a [PackedShape],
     /// By block, as frames count them: its shape.
     shape_of_block: Vec<usize>,
+    /// From a block's coefficients to the next one's.
+    block_stride: u32,
     storage: Storage,
     negligible: f32,
     pending: Vec<Pending>,
@@ -75,28 +77,17 @@ struct Pending {
     start: usize,
 }
 
-/// Heights of the tiles of so many joint modes.
-fn tile_heights(modes: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..modes).step_by(TILE).map(move |start| {
-        let height = if modes - start <= HALF_TILE {
-            HALF_TILE
-        } else {
-            TILE
-        };
-        (start, height)
-    })
-}
-
 impl<'a> TransportPacker<'a> {
     pub(crate) fn new(
         shapes: &'a [PackedShape],
-        shape_of_block: Vec<usize>,
+        layout: &Layout,
         storage: Storage,
         negligible: f32,
     ) -> Self {
         Self {
             shapes,
-            shape_of_block,
+            shape_of_block: layout.shapes.iter().map(|&shape| shape as usize).collect(),
+            block_stride: 3 * layout.coefficient_stride as u32,
             storage,
             negligible,
             pending: Vec::new(),
@@ -140,8 +131,9 @@ impl<'a> TransportPacker<'a> {
         let columns = operator.columns();
         // (energy, tile, column) of everything.
         let mut parts: Vec<(f64, u32, u16)> = Vec::new();
-        for (tile, (start, height)) in tile_heights(to.joint_modes).enumerate() {
-            let rows = &to.row_order[start..(start + height).min(to.joint_modes)];
+        for (tile, rows) in to.row_tiles.iter().enumerate() {
+            let start = usize::from(rows.start);
+            let rows = &to.row_order[start..start + usize::from(rows.count)];
             for column in 0..columns {
                 let size = |&row: &u16| {
                     let row = usize::from(row);
@@ -172,15 +164,16 @@ impl<'a> TransportPacker<'a> {
             let tile = part[0].0;
             let first_column = self.columns.len();
             let start = self.values.len();
-            let first_row = tile as usize * TILE;
-            let left = to.joint_modes - first_row;
-            let height = if left <= HALF_TILE { HALF_TILE } else { TILE };
+            let rows = to.row_tiles[tile as usize];
+            let first_row = usize::from(rows.start);
             for &(_, column) in part {
                 self.columns.push(column);
-                for k in first_row..first_row + height {
-                    let row = to.row_order.get(k).map(|&row| usize::from(row));
-                    self.values
-                        .push(row.map_or(0.0, |row| operator[(row, usize::from(column))]));
+                for k in 0..usize::from(rows.height) {
+                    let value = (k < usize::from(rows.count)).then(|| {
+                        let row = usize::from(to.row_order[first_row + k]);
+                        operator[(row, usize::from(column))] * to.row_units[row]
+                    });
+                    self.values.push(value.unwrap_or(0.0));
                 }
             }
             self.pending.push(Pending {
@@ -208,7 +201,8 @@ impl<'a> TransportPacker<'a> {
         for (target, &shape) in self.shape_of_block.iter().enumerate() {
             let shape = &self.shapes[shape];
             let first_tile = packed.tiles.len() as u32;
-            for (tile, (_, height)) in tile_heights(shape.joint_modes).enumerate() {
+            for (tile, rows) in shape.row_tiles.iter().enumerate() {
+                let height = usize::from(rows.height);
                 let first = next;
                 while next < self.pending.len()
                     && (self.pending[next].target, self.pending[next].tile)
@@ -243,7 +237,9 @@ impl<'a> TransportPacker<'a> {
                         }
                         packed.multiply_adds += 3 * height;
                     }
-                    let columns = self.columns[entry.columns.clone()].iter().copied();
+                    let first = entry.source * self.block_stride;
+                    let columns = self.columns[entry.columns.clone()].iter();
+                    let columns = columns.map(|&column| first + u32::from(column));
                     let columns = packed.columns.push(columns);
                     packed.entries.push(TransportEntry {
                         source: entry.source,
@@ -253,7 +249,6 @@ impl<'a> TransportPacker<'a> {
                     });
                 }
                 packed.tiles.push(TransportTile {
-                    rows: height as u8,
                     entries: first_entry..packed.entries.len() as u32,
                     scale,
                 });
