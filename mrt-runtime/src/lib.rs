@@ -53,6 +53,7 @@ pub mod scene;
 pub mod assemble;
 pub mod pack;
 mod propagate;
+pub mod opening_responses;
 pub mod light;
 pub mod visibility;
 pub mod direct;

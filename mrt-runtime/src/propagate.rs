@@ -16,6 +16,7 @@ pub(crate) use table::used_paths;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators};
+use crate::opening_responses::OpeningResponses;
 use crate::path::{Roll, hole_of};
 use crate::scene::{Gate, Scene, Transport};
 use crate::shape::Aperture;
@@ -53,14 +54,56 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<Transport, AssembleError> {
+    let mut gated: BTreeMap<Vec<u32>, Vec<Placed>> = BTreeMap::new();
+    let mut bytes = 0;
+    follow_all(
+        scene,
+        dictionary,
+        used_shapes,
+        config,
+        |source, arrivals| {
+            for (doors, block, joint) in project(scene, used_shapes, arrivals) {
+                bytes += std::mem::size_of_val(joint.data());
+                if bytes > max_bytes {
+                    return Err(AssembleError::TooLarge {
+                        expected: config.max_bytes,
+                        found: config.max_bytes - max_bytes + bytes,
+                    });
+                }
+                gated.entry(doors).or_default().push((block, source, joint));
+            }
+            Ok(())
+        },
+    )?;
+    let row_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.joint.len()).collect();
+    let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
+    let steady = gated.remove(&Vec::new()).unwrap_or_default();
+    Ok(Transport {
+        steady: BlockSparse::from_blocks(&row_sizes, &column_sizes, steady),
+        gated: gated
+            .into_iter()
+            .map(|(doors, blocks)| Gate {
+                doors,
+                operator: BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks),
+            })
+            .collect(),
+    })
+}
+
+/// Gives `visit` each block with what its light becomes at the openings that it enters others by.
+fn follow_all<M: OperatorMatrix>(
+    scene: &Scene,
+    dictionary: &Dictionary<M>,
+    used_shapes: &[&ShapeOperators<M>],
+    config: &AssembleConfig,
+    mut visit: impl FnMut(usize, Arrivals) -> Result<(), AssembleError>,
+) -> Result<(), AssembleError> {
     let transits = Transits::new(scene, dictionary, used_shapes);
     let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
     let covered = match config.coupling {
         Coupling::Table => dictionary.paths.depths(),
         Coupling::Lightfield => [0; 3],
     };
-    let mut gated: BTreeMap<Vec<u32>, Vec<Placed>> = BTreeMap::new();
-    let mut bytes = 0;
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);
     // Numbers of holes that a path of the scene may have, for the table's depths.
@@ -89,30 +132,41 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
                 add(&mut arrivals, key, responses);
             }
         }
-        for (doors, block, joint) in project(scene, used_shapes, arrivals) {
-            bytes += std::mem::size_of_val(joint.data());
-            if bytes > max_bytes {
-                return Err(AssembleError::TooLarge {
-                    expected: config.max_bytes,
-                    found: config.max_bytes - max_bytes + bytes,
-                });
-            }
-            gated.entry(doors).or_default().push((block, source, joint));
-        }
+        visit(source, arrivals)?;
     }
-    let row_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.joint.len()).collect();
-    let column_sizes: Vec<usize> = scene.blocks.iter().map(|b| b.coefficients.len()).collect();
-    let steady = gated.remove(&Vec::new()).unwrap_or_default();
-    Ok(Transport {
-        steady: BlockSparse::from_blocks(&row_sizes, &column_sizes, steady),
-        gated: gated
-            .into_iter()
-            .map(|(doors, blocks)| Gate {
-                doors,
-                operator: BlockSparse::from_blocks(&row_sizes, &column_sizes, blocks),
-            })
-            .collect(),
-    })
+    Ok(())
+}
+
+/// [`Arrivals`] of all blocks, for [`responses_by_opening`](crate::opening_responses::responses_by_opening).
+pub(crate) fn responses_by_opening<M: OperatorMatrix>(
+    scene: &Scene,
+    dictionary: &Dictionary<M>,
+    used_shapes: &[&ShapeOperators<M>],
+    config: &AssembleConfig,
+) -> Result<Vec<OpeningResponses>, AssembleError> {
+    let mut all = Vec::new();
+    follow_all(
+        scene,
+        dictionary,
+        used_shapes,
+        config,
+        |source, arrivals| {
+            for (key, responses) in arrivals {
+                let mut openings = scene.blocks[key.block].shape.openings.iter();
+                if let Some(opening) = openings.position(|o| o.face == key.face) {
+                    all.push(OpeningResponses {
+                        target: key.block,
+                        opening,
+                        exchanged: key.exchanged,
+                        source,
+                        responses,
+                    });
+                }
+            }
+            Ok(())
+        },
+    )?;
+    Ok(all)
 }
 
 /// Adds responses to those that enter at the same place.

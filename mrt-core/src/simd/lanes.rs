@@ -133,7 +133,7 @@ impl Lanes for Scalar {
 }
 
 /// 2^112: the distance between the exponents of half and single precision.
-pub(super) const F16_EXPONENT: f32 = 5.192_296_9e33;
+pub(super) const F16_EXPONENT: f32 = 5.192_297e33;
 
 /// The number of a half's bits. Exponent and mantissa move to their place in an `f32`, whose exponent is then too
 /// small by 112; a product makes up for that, and is exact for subnormal halves too.
