@@ -351,9 +351,13 @@ fn write_files(out: &Path, records: &[Record], machine: &Machine) -> Result<(), 
     let mut levels: Vec<&str> = records.iter().map(|r| r.level.as_str()).collect();
     levels.dedup();
     for level in levels {
-        let marks = chart::draw(level, records, &remarks(level, records, machine));
-        write(format!("{level}.svg"), picture::svg(&marks))?;
-        picture::canvas(&marks).write(&out.join(format!("{level}.png")))?;
+        let remarks = remarks(level, records, machine);
+        for view in chart::View::ALL {
+            let marks = chart::draw(level, view, records, &remarks);
+            let name = format!("{level}{}", view.suffix());
+            write(format!("{name}.svg"), picture::svg(&marks))?;
+            picture::canvas(&marks).write(&out.join(format!("{name}.png")))?;
+        }
     }
     Ok(())
 }
@@ -361,14 +365,16 @@ fn write_files(out: &Path, records: &[Record], machine: &Machine) -> Result<(), 
 fn remarks(level: &str, records: &[Record], machine: &Machine) -> Vec<String> {
     let simd = SimdLevel::detect();
     let lights = records.iter().find(|r| r.level == level).map(|r| r.lights);
+    let lights = match lights {
+        Some(1) => "1 light".to_owned(),
+        other => format!("{} lights", other.unwrap_or(0)),
+    };
     vec![
         format!(
-            "{} sphere lights; peak of a core {} GFLOP/s ({}), memory {} GB/s; ray methods timed at a sample of the \
-             texels",
-            lights.unwrap_or(0),
+            "{lights}; peak of a core {} GFLOP/s ({}), memory {} GB/s; ray methods timed at a sample of the texels",
             significant(machine.peak(simd, 1)),
             simd.name(),
-            significant(machine.memory)
+            significant(machine.memory())
         ),
         "Errors are against exact radiosity at each dictionary's own texel centres.".to_owned(),
     ]
@@ -376,6 +382,10 @@ fn remarks(level: &str, records: &[Record], machine: &Machine) -> Vec<String> {
 
 fn print(records: &[Record], machine: &Machine) {
     crate::report!("{}", record::overview(records));
+    crate::report_line!();
+    for sentence in record::rays_at_equal_time(records) {
+        crate::report_line!("{sentence}");
+    }
     crate::report_line!();
     crate::report!("{}", record::stages(records));
     crate::report_line!();
@@ -386,9 +396,8 @@ fn print(records: &[Record], machine: &Machine) {
             significant(*gflops)
         );
     }
-    crate::report_line!(
-        "read by one core: {} GB/s from memory, {} GB/s from caches",
-        significant(machine.memory),
-        significant(machine.cache)
-    );
+    for (bytes, rate) in &machine.reads {
+        let (bytes, rate) = (significant(*bytes as f64 / 1e6), significant(*rate));
+        crate::report_line!("one core, reading {bytes} MB again and again: {rate} GB/s");
+    }
 }

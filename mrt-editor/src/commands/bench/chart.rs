@@ -1,8 +1,9 @@
 //! Run time against error, both logarithmic: what to draw and where, for any writer.
 
-use super::record::Record;
+use super::record::{Record, frontier};
 use crate::commands::figures::canvas::{Colour, FAINT_INK, INK, PAPER, RULE, SERIES, mix};
 use crate::commands::figures::canvas::{Lettering, Side};
+use std::collections::BTreeSet;
 
 /// Pixels across and down.
 pub const SIZE: [i32; 2] = [1120, 640];
@@ -58,6 +59,53 @@ const METHODS: [(&str, &str, Colour, bool); 6] = [
     ("gather", "rays from texels", SERIES[4], true),
 ];
 
+/// What is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// All methods, from lights to indirect light.
+    Methods,
+    /// The frame and the dense products, from direct light to indirect light.
+    Frame,
+}
+
+impl View {
+    /// Both.
+    pub const ALL: [View; 2] = [View::Methods, View::Frame];
+
+    /// What it adds to the name of a level's picture.
+    pub fn suffix(self) -> &'static str {
+        match self {
+            View::Methods => "",
+            View::Frame => "-frame",
+        }
+    }
+
+    fn shows(self, record: &Record) -> bool {
+        self == View::Methods || ["mrt", "paper"].contains(&record.method)
+    }
+
+    fn ms(self, record: &Record) -> f64 {
+        match self {
+            View::Methods => record.ms_from_lights,
+            View::Frame => record.ms,
+        }
+    }
+
+    fn title(self) -> &'static str {
+        match self {
+            View::Methods => "run time against error of the first bounce",
+            View::Frame => "run time of the indirect light against its error",
+        }
+    }
+
+    fn time_label(self) -> &'static str {
+        match self {
+            View::Methods => "ms from lights to indirect light",
+            View::Frame => "ms from direct light to indirect light",
+        }
+    }
+}
+
 /// A logarithmic axis.
 struct Axis {
     /// Decimal logarithms at both ends.
@@ -106,48 +154,76 @@ impl Axis {
 }
 
 /// A picture of the records of one level.
-pub fn draw(level: &str, records: &[Record], remarks: &[String]) -> Vec<Mark> {
+pub fn draw(level: &str, view: View, records: &[Record], remarks: &[String]) -> Vec<Mark> {
     let shown: Vec<&Record> = records
         .iter()
-        .filter(|r| r.level == level && r.ms_from_lights > 0.0 && r.rel_l2 > 0.0)
+        .filter(|r| r.level == level && view.shows(r) && view.ms(r) > 0.0 && r.rel_l2 > 0.0)
         .collect();
     let [left, top, right, bottom] = AREA;
-    let x = Axis::new(shown.iter().map(|r| r.ms_from_lights), [left, right]);
+    let x = Axis::new(shown.iter().map(|r| view.ms(r)), [left, right]);
     let y = Axis::new(shown.iter().map(|r| 100.0 * r.rel_l2), [bottom, top]);
-    let place = |r: &Record| [x.place(r.ms_from_lights), y.place(100.0 * r.rel_l2)];
+    let place = |r: &Record| [x.place(view.ms(r)), y.place(100.0 * r.rel_l2)];
     let mut marks = Vec::new();
-    draw_frame(&mut marks, level, remarks, &x, &y);
+    draw_frame(
+        &mut marks,
+        &format!("{level}: {}", view.title()),
+        remarks,
+        &x,
+        &y,
+    );
+    draw_labels(&mut marks, view);
+    let ours: Vec<&Record> = shown
+        .iter()
+        .copied()
+        .filter(|r| r.method == "mrt")
+        .collect();
+    let points: Vec<[f64; 2]> = ours.iter().map(|r| [view.ms(r), r.rel_l2]).collect();
+    let mut best: Vec<&Record> = Vec::new();
+    best.extend(
+        ours.iter()
+            .zip(frontier(&points))
+            .filter(|(_, is)| *is)
+            .map(|(r, _)| r),
+    );
+    let is_best = |record: &Record| best.iter().any(|&other| std::ptr::eq(other, record));
     let mut names = Names::default();
     for &(method, _, colour, is_joined) in METHODS.iter().rev() {
         let of_method = || shown.iter().copied().filter(|r| r.method == method);
         if is_joined {
-            join(&mut marks, of_method().collect(), colour, 1.5, place);
+            // Sweeps of another resolution have a line of their own.
+            let resolutions: BTreeSet<usize> = of_method().map(|r| r.resolution).collect();
+            for resolution in resolutions {
+                let sweep = of_method().filter(|r| r.resolution == resolution);
+                join(&mut marks, sweep.map(place).collect(), colour, 1.5);
+            }
         }
         if method == "mrt" {
             join(
                 &mut marks,
-                of_method().filter(|r| r.pareto).collect(),
+                best.iter().map(|r| place(r)).collect(),
                 colour,
                 2.5,
-                place,
             );
         }
-        for record in of_method() {
-            let is_faint = method == "mrt" && !record.pareto;
-            let at = place(record);
-            let (radius, colour) = match is_faint {
-                true => (3.5, mix(colour, PAPER, 0.5)),
-                false => (5.0, colour),
-            };
-            marks.push(Mark::Disk { at, radius, colour });
-            names.keep_clear(at);
+        // What is faint goes under what is not.
+        for pass in [false, true] {
+            for record in of_method().filter(|r| (method != "mrt" || is_best(r)) == pass) {
+                let at = place(record);
+                let (radius, colour) = match pass {
+                    false => (3.5, mix(colour, PAPER, 0.5)),
+                    true => (5.0, colour),
+                };
+                marks.push(Mark::Disk { at, radius, colour });
+                names.keep_clear(at);
+            }
         }
     }
     // Names after all points, so that none hides one; those of the frontier first.
-    for &(method, _, colour, _) in &METHODS {
+    for &(method, _, colour, is_joined) in &METHODS {
         for record in shown.iter().filter(|r| r.method == method) {
-            if method != "mrt" || record.pareto {
-                names.write(&mut marks, place(record), short_name(record), colour);
+            if method != "mrt" || is_best(record) {
+                let name = short_name(record, is_joined.then_some(shown.as_slice()));
+                names.write(&mut marks, place(record), name, (colour, is_joined));
             }
         }
     }
@@ -155,52 +231,39 @@ pub fn draw(level: &str, records: &[Record], remarks: &[String]) -> Vec<Mark> {
     marks
 }
 
-/// A line through records from the fastest to the slowest.
-fn join(
-    marks: &mut Vec<Mark>,
-    mut records: Vec<&Record>,
-    colour: Colour,
-    width: f32,
-    place: impl Fn(&Record) -> [f32; 2],
-) {
-    // Sweeps of another resolution have a line of their own.
-    records.sort_by(|a, b| a.ms_from_lights.total_cmp(&b.ms_from_lights));
-    let is_sweep = records.first().is_some_and(|r| r.method != "mrt");
-    let mut resolutions: Vec<usize> = match is_sweep {
-        true => records.iter().map(|r| r.resolution).collect(),
-        false => vec![0],
-    };
-    resolutions.sort_unstable();
-    resolutions.dedup();
-    for resolution in resolutions {
-        let line: Vec<[f32; 2]> = records
-            .iter()
-            .filter(|r| !is_sweep || r.resolution == resolution)
-            .map(|r| place(r))
-            .collect();
-        for pair in line.windows(2) {
-            marks.push(Mark::Line {
-                from: pair[0],
-                to: pair[1],
-                width,
-                colour,
-            });
-        }
+/// A line through points from left to right.
+fn join(marks: &mut Vec<Mark>, mut points: Vec<[f32; 2]>, colour: Colour, width: f32) {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    for pair in points.windows(2) {
+        marks.push(Mark::Line {
+            from: pair[0],
+            to: pair[1],
+            width,
+            colour,
+        });
     }
 }
 
-/// The part of a case that its colour does not say.
-fn short_name(record: &Record) -> String {
-    match record.method {
+/// What a point's colour does not say; of sweeps at several resolutions, which.
+fn short_name(record: &Record, sweep: Option<&[&Record]>) -> String {
+    let name = match record.method {
         "mrt" => record.way().replace('/', " "),
         "paper" => record.preset.clone(),
         "dense" => format!("{0}x{0}", record.resolution),
         "svd" => format!("rank {}", record.size),
         _ => record.size.to_string(),
+    };
+    let others = sweep.unwrap_or(&[]).iter();
+    let is_one_of_several = others
+        .filter(|other| other.method == record.method)
+        .any(|other| other.resolution != record.resolution);
+    match is_one_of_several {
+        true => format!("{name} ({0}x{0})", record.resolution),
+        false => name,
     }
 }
 
-fn draw_frame(marks: &mut Vec<Mark>, level: &str, remarks: &[String], x: &Axis, y: &Axis) {
+fn draw_frame(marks: &mut Vec<Mark>, title: &str, remarks: &[String], x: &Axis, y: &Axis) {
     let [left, top, right, bottom] = AREA;
     let mut text = |at: [i32; 2], side, lettering, colour, text: String| {
         marks.push(Mark::Text {
@@ -211,8 +274,13 @@ fn draw_frame(marks: &mut Vec<Mark>, level: &str, remarks: &[String], x: &Axis, 
             text,
         });
     };
-    let title = format!("{level}: run time against error of the first bounce");
-    text([20, 24], Side::Right, Lettering::Title, INK, title);
+    text(
+        [20, 24],
+        Side::Right,
+        Lettering::Title,
+        INK,
+        title.to_owned(),
+    );
     for (k, remark) in (0..).zip(remarks) {
         let at = [20, 44 + 16 * k];
         text(
@@ -223,12 +291,6 @@ fn draw_frame(marks: &mut Vec<Mark>, level: &str, remarks: &[String], x: &Axis, 
             remark.clone(),
         );
     }
-    let label = "ms from lights to indirect light".to_owned();
-    let middle = [((left + right) / 2.0) as i32, bottom as i32 + 38];
-    text(middle, Side::Middle, Lettering::Label, INK, label);
-    let label = "error, % (relative L2)".to_owned();
-    let above = [20, top as i32 - 12];
-    text(above, Side::Right, Lettering::Label, INK, label);
     for value in x.ticks() {
         let at = [x.place(value) as i32, bottom as i32 + 16];
         text(at, Side::Middle, Lettering::Label, INK, tick(value));
@@ -255,6 +317,24 @@ fn draw_frame(marks: &mut Vec<Mark>, level: &str, remarks: &[String], x: &Axis, 
     }
     line([left, top], [left, bottom], INK);
     line([left, bottom], [right, bottom], INK);
+}
+
+fn draw_labels(marks: &mut Vec<Mark>, view: View) {
+    let [left, top, right, bottom] = AREA;
+    let below = [((left + right) / 2.0) as i32, bottom as i32 + 38];
+    let above = [20, top as i32 - 12];
+    for (at, side, text) in [
+        (below, Side::Middle, view.time_label()),
+        (above, Side::Right, "error, % (relative L2)"),
+    ] {
+        marks.push(Mark::Text {
+            at,
+            side,
+            lettering: Lettering::Label,
+            colour: INK,
+            text: text.to_owned(),
+        });
+    }
 }
 
 /// 1, 2 or 5 times a power of ten, without an exponent where it is short.
@@ -322,7 +402,13 @@ impl Names {
     }
 
     /// Writes a name beside its point, where there is room; leaves it out where there is none.
-    fn write(&mut self, marks: &mut Vec<Mark>, [x, y]: [f32; 2], text: String, colour: Colour) {
+    fn write(
+        &mut self,
+        marks: &mut Vec<Mark>,
+        [x, y]: [f32; 2],
+        text: String,
+        (colour, is_on_line): (Colour, bool),
+    ) {
         let width = Self::LETTER[0] * text.chars().count() as f32;
         let half = Self::LETTER[1] / 2.0;
         let right = (Side::Right, x + 9.0, x + 9.0);
@@ -330,7 +416,9 @@ impl Names {
         let middle = (Side::Middle, x, x - width / 2.0);
         let places = [(right, 0.0), (left, 0.0), (middle, -15.0), (middle, 15.0)];
         let near = [(right, -13.0), (right, 13.0), (left, -13.0), (left, 13.0)];
-        for ((side, at, start), offset) in places.into_iter().chain(near) {
+        // Names on a line would be struck through by it; all of these fall.
+        let first = if is_on_line { &near[..] } else { &places[..] };
+        for &((side, at, start), offset) in first.iter().chain(&places).chain(&near) {
             let room = [start, y + offset - half, start + width, y + offset + half];
             let is_inside = room[0] > AREA[0] && room[2] < AREA[2] + 10.0 && room[3] < AREA[3];
             let overlaps = |other: &[f32; 4]| {
@@ -371,7 +459,12 @@ mod tests {
     fn names_do_not_cover_each_other() {
         let (mut names, mut marks) = (Names::default(), Vec::new());
         for _ in 0..20 {
-            names.write(&mut marks, [400.0, 300.0], "a name".to_owned(), INK);
+            names.write(
+                &mut marks,
+                [400.0, 300.0],
+                "a name".to_owned(),
+                (INK, false),
+            );
         }
         assert!(marks.len() > 1 && marks.len() < 9, "{}", marks.len());
     }

@@ -11,11 +11,9 @@ const ACCUMULATORS: usize = 12;
 /// Products and sums of a lane in one call: long against the clock's resolution, short against a time slice.
 const STEPS: usize = 20_000;
 
-/// Numbers in the large buffer: 256 MiB, far more than the caches of one core reach.
-const LARGE: usize = 64 << 20;
-
-/// Numbers in the small buffer: 256 KiB, in the second level of any cache of the last ten years.
-const SMALL: usize = 64 << 10;
+/// Bytes of the buffers that are read: one in the second level of any cache of the last ten years, one in the third
+/// level of most, and one far larger than the caches that a core reaches.
+const BUFFERS: [usize; 3] = [256 << 10, 4 << 20, 256 << 20];
 
 /// Time spent on each figure.
 const BUDGET: Duration = Duration::from_millis(120);
@@ -25,24 +23,20 @@ const BUDGET: Duration = Duration::from_millis(120);
 pub struct Machine {
     /// Floating-point operations a second in units of 1e9, a fused product and sum being two, of each level.
     pub gflops: Vec<(SimdLevel, f64)>,
-    /// GB/s read from memory.
-    pub memory: f64,
-    /// GB/s read from a buffer that stays in the caches.
-    pub cache: f64,
+    /// Bytes of a buffer and GB/s at which it is read again and again; the smallest first.
+    pub reads: Vec<(usize, f64)>,
 }
 
 impl Machine {
     /// Measures all levels that there are; takes about a second.
     pub fn measure() -> Self {
         let level = SimdLevel::detect();
-        let large = vec![1.0f32; LARGE];
-        let small = vec![1.0f32; SMALL];
+        let read = |bytes: usize| (bytes, bandwidth(level, &vec![1.0f32; bytes / 4]));
         Self {
             gflops: SimdLevel::available()
                 .map(|level| (level, peak(level)))
                 .collect(),
-            memory: bandwidth(level, &large),
-            cache: bandwidth(level, &small),
+            reads: BUFFERS.into_iter().map(read).collect(),
         }
     }
 
@@ -52,13 +46,17 @@ impl Machine {
         of_level.map_or(f64::NAN, |(_, gflops)| gflops * threads as f64)
     }
 
-    /// GB/s at which so many bytes can be read again and again: those of the cache where they fit.
+    /// GB/s at which so many bytes can be read again and again: that of the smallest buffer in which they fit.
     pub fn bandwidth(&self, bytes: usize) -> f64 {
-        if bytes <= SMALL * size_of::<f32>() {
-            self.cache
-        } else {
-            self.memory
-        }
+        let fitting = self.reads.iter().find(|(buffer, _)| bytes <= *buffer);
+        fitting
+            .or(self.reads.last())
+            .map_or(f64::NAN, |(_, rate)| *rate)
+    }
+
+    /// GB/s read from memory.
+    pub fn memory(&self) -> f64 {
+        self.bandwidth(usize::MAX)
     }
 }
 

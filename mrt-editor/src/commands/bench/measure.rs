@@ -191,16 +191,10 @@ impl Bench<'_> {
         let simd = SimdLevel::detect();
         let peak = self.machine.peak(simd, 1);
         let bytes = paper.bytes();
-        let stages = paper.flops().into_iter().enumerate().map(|(k, flops)| {
-            let cost = Cost { flops, bytes: 0.0 };
-            stage(
-                paper::STAGES[k],
-                times.median(&[k]),
-                cost,
-                peak,
-                f64::INFINITY,
-            )
-        });
+        let bandwidth = self.machine.bandwidth(bytes);
+        let stages = paper.costs().into_iter().enumerate();
+        let stages = stages
+            .map(|(k, cost)| stage(paper::STAGES[k], times.median(&[k]), cost, peak, bandwidth));
         let ms = 1e3 * times.median(&[0, 1, 2]);
         let all = &paper.library_names().join("+");
         let way = format!("{}/paper/{all}/t1", variant.preset);

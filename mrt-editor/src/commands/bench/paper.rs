@@ -5,7 +5,7 @@
 //! beforehand and not timed, and neither is clamping.
 
 use super::library::{Libraries, Library, Sum, WrongProduct, difference, product};
-use super::ours::{Ours, assemble_config, texel_of};
+use super::ours::{Cost, Ours, assemble_config, texel_of};
 use super::reference::Receiver;
 use super::setting::Setting;
 use super::timing::Timed;
@@ -165,8 +165,33 @@ impl Paper {
         matrices.map(|matrix| size_of_val(matrix.data())).sum()
     }
 
+    /// What each stage has to do.
+    pub fn costs(&self) -> [Cost; STAGES.len()] {
+        let flops = self.flops();
+        let mut bytes = [0; STAGES.len()];
+        let size = |matrix: &Matrix<f32>| size_of_val(matrix.data());
+        for group in &self.groups {
+            let responses = group.responses.iter().map(size).sum::<usize>();
+            let coefficients = size(&group.coefficients);
+            bytes[0] += size(&group.coefficients_from_direct) + size(&group.light) + coefficients;
+            bytes[1] += coefficients + responses;
+            bytes[2] += size(&group.indirect_basis) + coefficients + responses;
+            bytes[2] += group.response_bases.iter().map(size).sum::<usize>();
+            bytes[2] += size(&group.irradiance);
+        }
+        bytes[1] += self
+            .arrivals
+            .iter()
+            .map(|a| size(&a.operator))
+            .sum::<usize>();
+        std::array::from_fn(|stage| Cost {
+            flops: flops[stage],
+            bytes: bytes[stage] as f64,
+        })
+    }
+
     /// Operations of each stage, a product and a sum being two.
-    pub fn flops(&self) -> [f64; STAGES.len()] {
+    fn flops(&self) -> [f64; STAGES.len()] {
         let of =
             |matrix: &Matrix<f32>, columns: usize| 2.0 * (matrix.data().len() * columns) as f64;
         let mut flops = [0.0; STAGES.len()];

@@ -67,7 +67,7 @@ pub struct Record {
     pub bytes_touched: usize,
     /// Stage by stage.
     pub stages: Vec<StageRecord>,
-    /// True if no other way of the same method is as fast and as exact.
+    /// True for a setting of the frame where no other has both a smaller `ms` and a smaller error.
     pub pareto: bool,
 }
 
@@ -78,21 +78,32 @@ impl Record {
     }
 }
 
-/// Marks the records that no other of their level and method beats in both time and error.
+/// Marks the records of the frame that no other of their level beats in both time and error.
 pub fn mark_pareto(records: &mut [Record]) {
-    let points: Vec<(String, &str, f64, f64)> = records
-        .iter()
-        .map(|r| (r.level.clone(), r.method, r.ms_from_lights, r.rel_l2))
-        .collect();
-    for (k, record) in records.iter_mut().enumerate() {
-        let (level, method, ms, error) = &points[k];
-        let beats = |(i, other): (usize, &(String, &str, f64, f64))| {
-            let is_rival = (&other.0, other.1) == (level, *method);
-            let is_better = other.2 < *ms || other.3 < *error || i < k;
-            is_rival && i != k && other.2 <= *ms && other.3 <= *error && is_better
-        };
-        record.pareto = !points.iter().enumerate().any(beats);
+    let mut levels: Vec<String> = records.iter().map(|r| r.level.clone()).collect();
+    levels.dedup();
+    for level in levels {
+        let mut ours: Vec<&mut Record> = records
+            .iter_mut()
+            .filter(|r| r.method == "mrt" && r.level == level)
+            .collect();
+        let points: Vec<[f64; 2]> = ours.iter().map(|r| [r.ms, r.rel_l2]).collect();
+        for (record, is_best) in ours.iter_mut().zip(frontier(&points)) {
+            record.pareto = is_best;
+        }
     }
+}
+
+/// For each point whether no other is as small in both coordinates; of equal points the first.
+pub fn frontier(points: &[[f64; 2]]) -> Vec<bool> {
+    let is_beaten = |k: usize| {
+        let [x, y] = points[k];
+        points.iter().enumerate().any(|(i, &[other_x, other_y])| {
+            let is_better = other_x < x || other_y < y || i < k;
+            i != k && other_x <= x && other_y <= y && is_better
+        })
+    };
+    (0..points.len()).map(|k| !is_beaten(k)).collect()
 }
 
 /// All records, one a line.
@@ -158,8 +169,9 @@ pub fn machine_csv(machine: &Machine) -> String {
     for (level, gflops) in &machine.gflops {
         let _ = writeln!(text, "gflops_{},{gflops}", level.name());
     }
-    let _ = writeln!(text, "memory_gbytes_per_s,{}", machine.memory);
-    let _ = writeln!(text, "cache_gbytes_per_s,{}", machine.cache);
+    for (bytes, rate) in &machine.reads {
+        let _ = writeln!(text, "gbytes_per_s_of_{bytes}_bytes,{rate}");
+    }
     text
 }
 
@@ -199,6 +211,34 @@ pub fn overview(records: &[Record]) -> Table {
         ]);
     }
     table
+}
+
+/// For each level and resolution, rays that a texel could have in the time that the fastest setting of the frame takes:
+/// a sentence each.
+pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
+    let is_better = |record: &&Record, other: &Record| {
+        (&other.level, other.resolution, other.method) == (&record.level, record.resolution, "mrt")
+            && other.ms_from_lights < record.ms_from_lights
+    };
+    let fastest = records
+        .iter()
+        .filter(|r| r.method == "mrt" && !records.iter().any(|other| is_better(r, other)));
+    let sentence = |ours: &Record| {
+        // The longest sweep has the smallest overhead a ray.
+        let rays = records
+            .iter()
+            .filter(|r| (&r.level, r.resolution) == (&ours.level, ours.resolution))
+            .filter(|r| r.method == "gather")
+            .max_by_key(|r| r.size)?;
+        let count = ours.ms_from_lights * rays.size as f64 / rays.ms;
+        Some(format!(
+            "in the time of {}, {} ms from lights to indirect light, {} rays could be sent from each texel",
+            ours.case,
+            significant(ours.ms_from_lights),
+            significant(count)
+        ))
+    };
+    fastest.filter_map(sentence).collect()
 }
 
 /// Shares of what the machine can do.
@@ -279,11 +319,11 @@ mod tests {
             record("mrt", 2.0, 0.05),
             record("mrt", 2.0, 0.2),
             record("mrt", 1.0, 0.1),
-            record("vpl", 9.0, 0.9),
+            record("vpl", 0.5, 0.01),
         ];
         mark_pareto(&mut records);
         let marks: Vec<bool> = records.iter().map(|r| r.pareto).collect();
-        assert_eq!(marks, [true, true, false, false, true]);
+        assert_eq!(marks, [true, true, false, false, false]);
     }
 
     #[test]

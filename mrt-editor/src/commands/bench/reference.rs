@@ -1,14 +1,15 @@
 //! The exact first bounce at a sample of a level's texels.
 //!
 //! All texels of a large level would take hours, and an error needs no more than a fair sample: each wall is cut into
-//! a grid of strata, and one texel of each is drawn and stands for all of its stratum. On the maze of 11 blocks that
-//! estimates errors within 3 % of those over all texels (a test holds it to 5). Levels of more than [`WHOLE_BLOCKS`]
-//! blocks are sampled by block too: some of those at each distance from the nearest light, each with only the part
-//! of the level that light reaches it from ([`Window`]).
+//! a grid of strata, and one texel of each is drawn and stands for all of its stratum. On the maze of 11 blocks the
+//! standard preset errs by 1.90 % over all 11,264 texels and by 1.89 % over a sample of 2,816; a test holds a smaller
+//! one to within 5 % of the error. Levels of more than [`WHOLE_BLOCKS`] blocks are sampled by block too: some of those
+//! at each distance from the nearest light, each with only the part of the level that light reaches it from
+//! ([`Window`]), which a test finds to show the same as the whole.
 //!
 //! Walls are divided finer than the dictionary's texels, an odd number of times, so that a texel's centre is the centre of
-//! a fine one too: at 16² texels the solver by itself errs by 0.2 % next to hot spots, which is as much as the best
-//! dictionary; on three times as many it is within 0.03 % of that on five times as many.
+//! a fine one too: with three times as many along an edge as 16 the solution is within 0.02 % of that with five times as
+//! many, where the solver on 16² texels by itself errs by 0.2 %, almost as much as the best dictionary.
 
 use super::setting::{ALBEDO, Setting};
 use glam::{DVec3, Vec3};
@@ -175,6 +176,8 @@ struct Plan<'a> {
     level: &'a Level,
     neighbours: Vec<[Option<(usize, Face)>; 6]>,
     resolution: usize,
+    /// Fine texels along an edge, at least.
+    fine: usize,
     windows: Vec<Window>,
 }
 
@@ -203,6 +206,7 @@ impl<'a> Plan<'a> {
             level,
             neighbours,
             resolution,
+            fine: FINE,
             windows: Vec::new(),
         };
         let count = level.blocks.len();
@@ -381,7 +385,7 @@ impl<'a> Plan<'a> {
         };
         let finer = (1..)
             .step_by(2)
-            .find(|k| k * self.resolution >= FINE)
+            .find(|k| k * self.resolution >= self.fine)
             .unwrap_or(1);
         let fine = finer * self.resolution;
         let scene = ExactScene::with_at_most(

@@ -1,30 +1,44 @@
+use super::super::ours::{Ours, Variant};
 use super::*;
+use crate::dictionary_source::from_file;
+use mrt_core::simd::SimdLevel;
+use mrt_core::storage::Storage;
+use mrt_runtime::assemble::Coupling;
+use mrt_runtime::dictionary::Dictionary;
 
-/// An answer that is wrong by a smooth factor which differs from place to place.
-fn wrong(reference: &Reference) -> Vec<[f64; 3]> {
-    let wave = |r: &Receiver| 1.0 + 0.05 * (3.0 * r.position.x + 2.0 * r.position.z).sin();
-    let pairs = reference.irradiance.iter().zip(&reference.receivers);
-    pairs.map(|(e, r)| e.map(|e| e * wave(r))).collect()
+fn mobile() -> Dictionary {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/versions/2.mrt");
+    from_file(Path::new(file)).expect("the file of this version is read")
+}
+
+/// The error of a frame over all texels, and as estimated from a sample of them.
+fn errors(dictionary: &Dictionary, sample: usize) -> [f64; 2] {
+    let setting = Setting::new(11, None);
+    let lights = setting.spheres();
+    let variant = Variant {
+        preset: "any",
+        dictionary,
+        storage: Storage::F32,
+        coupling: Coupling::Table,
+        simd: SimdLevel::detect(),
+        threads: 1,
+    };
+    let ours = Ours::new(&setting, &variant).expect("a maze is a level");
+    [usize::MAX, sample].map(|receivers| {
+        let plan = Plan::new(&setting.level, &lights, dictionary.resolution, receivers);
+        let reference = plan.solve(&lights).expect("mazes can be solved");
+        let count: f64 = reference.receivers.iter().map(|r| r.weight).sum();
+        assert_eq!(count, ours.scene.texel_count() as f64);
+        reference.rel_l2(&ours.irradiance(&reference.receivers))
+    })
 }
 
 #[test]
 fn a_sample_estimates_the_error_over_all_texels() {
-    let setting = Setting::new(11, None);
-    let lights = setting.spheres();
-    let solve = |receivers| {
-        Plan::new(&setting.level, &lights, 6, receivers)
-            .solve(&lights)
-            .expect("mazes can be solved")
-    };
-    let (all, some) = (solve(usize::MAX), solve(400));
-    assert_eq!(all.receivers.len(), 46 * 36);
-    assert!(some.receivers.len() < all.receivers.len() / 2);
-    let count: f64 = some.receivers.iter().map(|r| r.weight).sum();
-    assert_eq!(count, all.receivers.len() as f64);
-    let [exact, estimate] = [&all, &some].map(|r| r.rel_l2(&wrong(r)));
+    let [whole, estimate] = errors(&mobile(), 500);
     assert!(
-        (estimate / exact - 1.0).abs() < 0.05,
-        "{estimate} for {exact}"
+        (estimate / whole - 1.0).abs() < 0.05,
+        "{estimate} for {whole}"
     );
 }
 
@@ -45,4 +59,16 @@ fn a_window_shows_what_the_whole_level_shows() {
     let found = whole.rel_l2(&parts.irradiance);
     // What crosses more than six openings between lamp and wall is left out.
     assert!(found < 1e-3, "{found}");
+}
+
+#[test]
+fn finer_walls_change_little() {
+    let setting = Setting::new(2, None);
+    let lights = setting.spheres();
+    let mut plan = Plan::new(&setting.level, &lights, 16, 120);
+    let kept = plan.solve(&lights).expect("mazes can be solved");
+    plan.fine = 80;
+    let finer = plan.solve(&lights).expect("mazes can be solved");
+    let found = finer.rel_l2(&kept.irradiance);
+    assert!(found < 5e-4, "{found}");
 }
