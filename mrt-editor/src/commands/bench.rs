@@ -183,7 +183,8 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
         measure_all(args, &dictionaries, &kept, &mut bench, progress)
     });
     let records = measured.map_err(|error| match error {
-        BenchError::Measure(MeasureError::Cancelled(cancelled)) => cancelled.into(),
+        BenchError::Measure(MeasureError::Cancelled(cancelled))
+        | BenchError::Reference(ReferenceError::Cancelled(cancelled)) => cancelled.into(),
         other => other,
     })?;
     write_files(&args.out, &records, &machine)?;
@@ -286,7 +287,7 @@ fn measure_all(
             let what = format!("{}, {}", setting.name, named.name);
             progress.step(&what, k * dictionaries.len() + i + 1, steps)?;
             let resolution = named.dictionary.resolution;
-            let reference = Reference::load_or_solve(&setting, resolution, kept)?;
+            let reference = Reference::load_or_solve(&setting, resolution, kept, progress)?;
             let variants = variants(args, named);
             let (found, baseline) = bench.reduced(&setting, &reference, &variants)?;
             records.extend(found);
@@ -351,8 +352,8 @@ fn write_files(out: &Path, records: &[Record], machine: &Machine) -> Result<(), 
     let mut levels: Vec<&str> = records.iter().map(|r| r.level.as_str()).collect();
     levels.dedup();
     for level in levels {
-        let remarks = remarks(level, records, machine);
         for view in chart::View::ALL {
+            let remarks = remarks(level, view, records, machine);
             let marks = chart::draw(level, view, records, &remarks);
             let name = format!("{level}{}", view.suffix());
             write(format!("{name}.svg"), picture::svg(&marks))?;
@@ -362,7 +363,7 @@ fn write_files(out: &Path, records: &[Record], machine: &Machine) -> Result<(), 
     Ok(())
 }
 
-fn remarks(level: &str, records: &[Record], machine: &Machine) -> Vec<String> {
+fn remarks(level: &str, view: chart::View, records: &[Record], machine: &Machine) -> Vec<String> {
     let simd = SimdLevel::detect();
     let lights = records.iter().find(|r| r.level == level).map(|r| r.lights);
     let lights = match lights {
@@ -371,10 +372,14 @@ fn remarks(level: &str, records: &[Record], machine: &Machine) -> Vec<String> {
     };
     vec![
         format!(
-            "{lights}; peak of a core {} GFLOP/s ({}), memory {} GB/s; ray methods timed at a sample of the texels",
+            "{lights}; peak of a core {} GFLOP/s ({}), memory {} GB/s{}",
             significant(machine.peak(simd, 1)),
             simd.name(),
-            significant(machine.memory())
+            significant(machine.memory()),
+            match view {
+                chart::View::Methods => "; numbers are virtual lights, and rays of a texel",
+                chart::View::Frame => "",
+            }
         ),
         "Errors are against exact radiosity at each dictionary's own texel centres.".to_owned(),
     ]

@@ -137,13 +137,13 @@ impl Axis {
         self.pixels[0] + share as f32 * (self.pixels[1] - self.pixels[0])
     }
 
-    /// Values to name: powers of ten, with 2 and 5 between them where there is room.
+    /// Values to name: powers of ten, with some between them where there is room.
     fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.range;
-        let steps: &[f64] = if high - low > 4.0 {
-            &[1.0]
-        } else {
-            &[1.0, 2.0, 5.0]
+        let steps: &[f64] = match high - low {
+            4.0.. => &[1.0],
+            1.0..4.0 => &[1.0, 2.0, 5.0],
+            _ => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
         };
         let powers = low.floor() as i32..=high.ceil() as i32;
         powers
@@ -218,8 +218,10 @@ pub fn draw(level: &str, view: View, records: &[Record], remarks: &[String]) -> 
             }
         }
     }
-    // Names after all points, so that none hides one; those of the frontier first.
-    for &(method, _, colour, is_joined) in &METHODS {
+    // Names after all points, so that none hides one; what the frame is compared with is named first.
+    let mut named_first = METHODS;
+    named_first.sort_by_key(|(method, ..)| *method != "paper");
+    for (method, _, colour, is_joined) in named_first {
         for record in shown.iter().filter(|r| r.method == method) {
             if method != "mrt" || is_best(record) {
                 let name = short_name(record, is_joined.then_some(shown.as_slice()));
@@ -244,7 +246,7 @@ fn join(marks: &mut Vec<Mark>, mut points: Vec<[f32; 2]>, colour: Colour, width:
     }
 }
 
-/// What a point's colour does not say; of sweeps at several resolutions, which.
+/// What a point's colour does not say; at the start of one of several sweeps, its resolution.
 fn short_name(record: &Record, sweep: Option<&[&Record]>) -> String {
     let name = match record.method {
         "mrt" => record.way().replace('/', " "),
@@ -253,11 +255,15 @@ fn short_name(record: &Record, sweep: Option<&[&Record]>) -> String {
         "svd" => format!("rank {}", record.size),
         _ => record.size.to_string(),
     };
-    let others = sweep.unwrap_or(&[]).iter();
-    let is_one_of_several = others
-        .filter(|other| other.method == record.method)
-        .any(|other| other.resolution != record.resolution);
-    match is_one_of_several {
+    let others = || {
+        sweep
+            .unwrap_or(&[])
+            .iter()
+            .filter(|r| r.method == record.method)
+    };
+    let is_one_of_several = others().any(|other| other.resolution != record.resolution);
+    let mut same = others().filter(|other| other.resolution == record.resolution);
+    match is_one_of_several && same.all(|other| other.size >= record.size) {
         true => format!("{name} ({0}x{0})", record.resolution),
         false => name,
     }
@@ -337,14 +343,17 @@ fn draw_labels(marks: &mut Vec<Mark>, view: View) {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, without an exponent where it is short.
+/// A value with one or two digits that mean something, without an exponent where it is short.
 fn tick(value: f64) -> String {
-    let power = value.log10().floor() as i32;
-    match power {
-        5.. => format!("{value:.0e}"),
-        0..5 => format!("{value:.0}"),
-        _ => format!("{value:.0$}", (-power) as usize),
+    if value >= 1e7 {
+        return format!("{value:.0e}");
     }
+    // Values between powers are computed, and may be off by a rounding.
+    let rounded = format!("{value:.9}");
+    rounded
+        .trim_end_matches('0')
+        .trim_end_matches('.')
+        .to_owned()
 }
 
 fn draw_legend(marks: &mut Vec<Mark>, shown: &[&Record]) {
@@ -416,9 +425,10 @@ impl Names {
         let middle = (Side::Middle, x, x - width / 2.0);
         let places = [(right, 0.0), (left, 0.0), (middle, -15.0), (middle, 15.0)];
         let near = [(right, -13.0), (right, 13.0), (left, -13.0), (left, 13.0)];
+        let far = [(right, -26.0), (right, 26.0), (left, -26.0), (left, 26.0)];
         // Names on a line would be struck through by it; all of these fall.
         let first = if is_on_line { &near[..] } else { &places[..] };
-        for &((side, at, start), offset) in first.iter().chain(&places).chain(&near) {
+        for &((side, at, start), offset) in first.iter().chain(&places).chain(&near).chain(&far) {
             let room = [start, y + offset - half, start + width, y + offset + half];
             let is_inside = room[0] > AREA[0] && room[2] < AREA[2] + 10.0 && room[3] < AREA[3];
             let overlaps = |other: &[f32; 4]| {

@@ -11,9 +11,9 @@ const ACCUMULATORS: usize = 12;
 /// Products and sums of a lane in one call: long against the clock's resolution, short against a time slice.
 const STEPS: usize = 20_000;
 
-/// Bytes of the buffers that are read: one in the second level of any cache of the last ten years, one in the third
+/// Bytes of the buffers that are read: one in the second level of any cache of the last ten years, two in the third
 /// level of most, and one far larger than the caches that a core reaches.
-const BUFFERS: [usize; 3] = [256 << 10, 4 << 20, 256 << 20];
+const BUFFERS: [usize; 4] = [256 << 10, 4 << 20, 16 << 20, 256 << 20];
 
 /// Time spent on each figure.
 const BUDGET: Duration = Duration::from_millis(120);

@@ -313,6 +313,10 @@ impl Bench<'_> {
             let mut last = Duration::ZERO;
             for count in counts {
                 self.progress.check()?;
+                // Each light has a virtual one at least.
+                if method == "vpl" && count < setting.lights.len() {
+                    continue;
+                }
                 // Each step of a sweep takes four times as long as the one before.
                 if 4 * last > self.ray_limit {
                     break;

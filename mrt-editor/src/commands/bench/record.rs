@@ -3,6 +3,7 @@
 use super::machine::Machine;
 use crate::table::Table;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// A stage of a frame.
@@ -216,13 +217,14 @@ pub fn overview(records: &[Record]) -> Table {
 /// For each level and resolution, rays that a texel could have in the time that the fastest setting of the frame takes:
 /// a sentence each.
 pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
-    let is_better = |record: &&Record, other: &Record| {
-        (&other.level, other.resolution, other.method) == (&record.level, record.resolution, "mrt")
-            && other.ms_from_lights < record.ms_from_lights
-    };
-    let fastest = records
-        .iter()
-        .filter(|r| r.method == "mrt" && !records.iter().any(|other| is_better(r, other)));
+    let mut fastest: BTreeMap<(&str, usize), &Record> = BTreeMap::new();
+    for record in records.iter().filter(|r| r.method == "mrt") {
+        let best = fastest.entry((&record.level, record.resolution));
+        let best = best.or_insert(record);
+        if record.ms_from_lights < best.ms_from_lights {
+            *best = record;
+        }
+    }
     let sentence = |ours: &Record| {
         // The longest sweep has the smallest overhead a ray.
         let rays = records
@@ -238,7 +240,7 @@ pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
             significant(count)
         ))
     };
-    fastest.filter_map(sentence).collect()
+    fastest.into_values().filter_map(sentence).collect()
 }
 
 /// Shares of what the machine can do.

@@ -16,6 +16,7 @@ use glam::{DVec3, Vec3};
 use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_core::cube::Face;
 use mrt_core::sampling::hash;
+use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_runtime::level::Level;
 use mrt_runtime::level_text::{LevelTextError, to_text};
 use mrt_tests::exact::direct::{PointLight, direct_quarters_in};
@@ -78,6 +79,9 @@ pub struct Reference {
 /// Why there is no reference.
 #[derive(Debug, thiserror::Error)]
 pub enum ReferenceError {
+    /// The user stopped it.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
     /// The exact solver refuses the level.
     #[error("exact solution: {0}")]
     Exact(#[from] ExactError),
@@ -110,6 +114,7 @@ impl Reference {
         setting: &Setting,
         resolution: usize,
         folder: &Path,
+        progress: &Progress,
     ) -> Result<Self, ReferenceError> {
         let plan = Plan::new(&setting.level, &setting.spheres(), resolution, RECEIVERS);
         let text = format!(
@@ -132,7 +137,7 @@ impl Reference {
                 irradiance,
             });
         }
-        let reference = plan.solve(&setting.spheres())?;
+        let reference = plan.solve(&setting.spheres(), progress)?;
         let kept = Kept {
             irradiance: reference.irradiance.clone(),
         };
@@ -357,9 +362,14 @@ impl<'a> Plan<'a> {
         receivers
     }
 
-    fn solve(&self, lights: &[(Vec3, f32, Vec3)]) -> Result<Reference, ExactError> {
+    fn solve(
+        &self,
+        lights: &[(Vec3, f32, Vec3)],
+        progress: &Progress,
+    ) -> Result<Reference, ReferenceError> {
         let mut irradiance = Vec::new();
         for window in &self.windows {
+            progress.check()?;
             irradiance.extend(self.solve_window(window, lights)?);
         }
         Ok(Reference {

@@ -26,7 +26,9 @@ fn errors(dictionary: &Dictionary, sample: usize) -> [f64; 2] {
     let ours = Ours::new(&setting, &variant).expect("a maze is a level");
     [usize::MAX, sample].map(|receivers| {
         let plan = Plan::new(&setting.level, &lights, dictionary.resolution, receivers);
-        let reference = plan.solve(&lights).expect("mazes can be solved");
+        let reference = plan
+            .solve(&lights, &Progress::silent())
+            .expect("mazes can be solved");
         let count: f64 = reference.receivers.iter().map(|r| r.weight).sum();
         assert_eq!(count, ours.scene.texel_count() as f64);
         reference.rel_l2(&ours.irradiance(&reference.receivers))
@@ -49,13 +51,17 @@ fn a_window_shows_what_the_whole_level_shows() {
     let mut plan = Plan::new(&setting.level, &lights, 4, 300);
     plan.windows = plan.windows(&lights, 300);
     assert!(plan.windows.len() > 10);
-    let parts = plan.solve(&lights).expect("windows can be solved");
+    let parts = plan
+        .solve(&lights, &Progress::silent())
+        .expect("windows can be solved");
     plan.windows = vec![Window {
         blocks: (0..30).collect(),
         senders: (0..30).collect(),
         receivers: parts.receivers.clone(),
     }];
-    let whole = plan.solve(&lights).expect("mazes can be solved");
+    let whole = plan
+        .solve(&lights, &Progress::silent())
+        .expect("mazes can be solved");
     let found = whole.rel_l2(&parts.irradiance);
     // What crosses more than six openings between lamp and wall is left out.
     assert!(found < 1e-3, "{found}");
@@ -66,9 +72,13 @@ fn finer_walls_change_little() {
     let setting = Setting::new(2, None);
     let lights = setting.spheres();
     let mut plan = Plan::new(&setting.level, &lights, 16, 120);
-    let kept = plan.solve(&lights).expect("mazes can be solved");
+    let kept = plan
+        .solve(&lights, &Progress::silent())
+        .expect("mazes can be solved");
     plan.fine = 80;
-    let finer = plan.solve(&lights).expect("mazes can be solved");
+    let finer = plan
+        .solve(&lights, &Progress::silent())
+        .expect("mazes can be solved");
     let found = finer.rel_l2(&kept.irradiance);
     assert!(found < 5e-4, "{found}");
 }
