@@ -289,7 +289,13 @@ fn measure_all(
             let resolution = named.dictionary.resolution;
             let reference = Reference::load_or_solve(&setting, resolution, kept, progress)?;
             let variants = variants(args, named);
-            let (found, baseline) = bench.reduced(&setting, &reference, &variants)?;
+            let (found, baseline) = match bench.reduced(&setting, &reference, &variants) {
+                Err(MeasureError::Ours { case, source }) if source.is_size() => {
+                    eprintln!("mrt: {case} is left out: {source}");
+                    continue;
+                }
+                other => other?,
+            };
             records.extend(found);
             if let Some(baseline) = baseline {
                 let entry = baselines.entry(resolution);

@@ -225,7 +225,8 @@ pub fn draw(level: &str, view: View, records: &[Record], remarks: &[String]) -> 
         for record in shown.iter().filter(|r| r.method == method) {
             if method != "mrt" || is_best(record) {
                 let name = short_name(record, is_joined.then_some(shown.as_slice()));
-                names.write(&mut marks, place(record), name, (colour, is_joined));
+                let is_on_line = is_joined || method == "mrt";
+                names.write(&mut marks, place(record), name, (colour, is_on_line));
             }
         }
     }

@@ -234,6 +234,14 @@ impl<'a> Product<'a> {
         &self.results[self.results.len() - 1]
     }
 
+    /// Libraries in use.
+    pub fn library_names(&self) -> Vec<&'static str> {
+        let factors = self.factors.iter();
+        let mut names: Vec<&str> = factors.map(|(_, library)| library.name()).collect();
+        names.dedup();
+        names
+    }
+
     /// Bytes of the factors.
     pub fn bytes(&self) -> usize {
         let factors = self.factors.iter();

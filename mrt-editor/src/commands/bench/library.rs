@@ -8,7 +8,7 @@
 )]
 
 use super::timing::fastest;
-use mrt_core::matrix::{Matrix, MatrixView, multiply};
+use mrt_core::matrix::{Matrix, MatrixView, multiply, multiply_add};
 use std::collections::HashMap;
 use std::time::Duration;
 
@@ -19,16 +19,19 @@ pub enum Library {
     Gemm,
     /// The crate `matrixmultiply`.
     MatrixMultiply,
+    /// The reference's own loops, which beat both where products are tiny.
+    Loops,
 }
 
 impl Library {
-    const ALL: [Library; 2] = [Library::Gemm, Library::MatrixMultiply];
+    const ALL: [Library; 3] = [Library::Gemm, Library::MatrixMultiply, Library::Loops];
 
-    /// Name of the crate.
+    /// Name of the crate, or "loops".
     pub fn name(self) -> &'static str {
         match self {
             Library::Gemm => "gemm",
             Library::MatrixMultiply => "matrixmultiply",
+            Library::Loops => "loops",
         }
     }
 }
@@ -143,6 +146,12 @@ pub fn product(
                 gemm::Parallelism::None,
             );
         },
+        Library::Loops => {
+            if !adds {
+                out.fill(0.0);
+            }
+            multiply_add(a, b, out);
+        }
         // SAFETY: as above.
         Library::MatrixMultiply => unsafe {
             matrixmultiply::sgemm(

@@ -196,8 +196,7 @@ impl Bench<'_> {
         let stages = stages
             .map(|(k, cost)| stage(paper::STAGES[k], times.median(&[k]), cost, peak, bandwidth));
         let ms = 1e3 * times.median(&[0, 1, 2]);
-        let all = &paper.library_names().join("+");
-        let way = format!("{}/paper/{all}/t1", variant.preset);
+        let way = format!("{}/paper/t1", variant.preset);
         Record {
             case: format!("{}/{way}", setting.name),
             level: setting.name.clone(),
@@ -211,6 +210,7 @@ impl Bench<'_> {
             coupling: "lightfield",
             simd: simd.name(),
             threads: 1,
+            library: paper.library_names().join("+"),
             ms,
             ms_min: 1e3 * times.smallest(&[0, 1, 2]),
             ms_from_lights: ms,
@@ -278,6 +278,7 @@ impl Bench<'_> {
                 ms_from_lights: 1e3 * (seconds + baseline.direct_seconds),
                 runs: times.count(),
                 paper_dense_ms: baseline.paper_ms,
+                library: product.library_names().join("+"),
                 bytes,
                 bytes_touched: bytes,
                 stages: vec![stage("F", seconds, cost, peak, bandwidth)],
@@ -371,6 +372,7 @@ impl Bench<'_> {
             coupling: "",
             simd: SimdLevel::detect().name(),
             threads: 1,
+            library: String::new(),
             ms: f64::NAN,
             ms_min: f64::NAN,
             ms_from_lights: f64::NAN,

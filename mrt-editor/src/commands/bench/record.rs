@@ -50,6 +50,8 @@ pub struct Record {
     pub simd: &'static str,
     /// Threads.
     pub threads: usize,
+    /// Libraries of dense products in use, joined by "+".
+    pub library: String,
     /// Median time from direct light to indirect light, milliseconds; of ray methods from lights to indirect light.
     pub ms: f64,
     /// Smallest such time.
@@ -109,14 +111,14 @@ pub fn frontier(points: &[[f64; 2]]) -> Vec<bool> {
 
 /// All records, one a line.
 pub fn csv(records: &[Record]) -> String {
-    let mut text = "case,level,blocks,lights,method,preset,resolution,size,storage,coupling,simd,threads,ms,ms_min,\
+    let mut text = "case,level,blocks,lights,method,preset,resolution,size,storage,coupling,simd,threads,library,ms,ms_min,\
                     ms_from_lights,runs,rel_l2,paper_dense_ms,bytes,bytes_touched,pareto\n"
         .to_owned();
     for r in records {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
             quoted(&r.case),
             r.level,
             r.blocks,
@@ -129,6 +131,7 @@ pub fn csv(records: &[Record]) -> String {
             r.coupling,
             r.simd,
             r.threads,
+            r.library,
             r.ms,
             r.ms_min,
             r.ms_from_lights,
@@ -301,6 +304,7 @@ mod tests {
             coupling: "table",
             simd: "scalar",
             threads: 1,
+            library: String::new(),
             ms,
             ms_min: ms,
             ms_from_lights: ms,
