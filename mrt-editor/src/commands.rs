@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub mod adapt;
 pub mod bake;
+pub mod bench;
 pub mod demo;
 pub mod figures;
 pub mod info;

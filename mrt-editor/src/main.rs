@@ -1,7 +1,7 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::commands::{accuracy, adapt, bake, demo, figures, info, light, map, pack};
+use mrt_editor::commands::{accuracy, adapt, bake, bench, demo, figures, info, light, map, pack};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
@@ -26,6 +26,7 @@ enum Command {
     Light(light::LightArgs),
     Pack(pack::PackArgs),
     Figures(figures::FiguresArgs),
+    Bench(bench::BenchArgs),
 }
 
 fn main() -> ExitCode {
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Light(args) => light::run(&args).map_err(Into::into),
         Command::Pack(args) => pack::run(&args).map_err(Into::into),
         Command::Figures(args) => figures::run(&args).map_err(Into::into),
+        Command::Bench(args) => bench::run(&args).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

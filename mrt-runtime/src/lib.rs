@@ -55,6 +55,7 @@ pub mod scene;
 pub mod assemble;
 pub mod pack;
 mod propagate;
+pub mod opening_responses;
 pub mod light;
 pub mod visibility;
 pub mod beam;

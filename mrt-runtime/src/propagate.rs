@@ -16,6 +16,7 @@ pub(crate) use table::used_paths;
 
 use crate::assemble::{AssembleConfig, AssembleError, Coupling};
 use crate::dictionary::{Dictionary, OperatorMatrix, ShapeOperators};
+use crate::opening_responses::OpeningResponses;
 use crate::packed::{PackedTransport, TransportPacker};
 use crate::path::{Roll, hole_of};
 use crate::scene::Scene;
@@ -50,12 +51,6 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     config: &AssembleConfig,
     max_bytes: usize,
 ) -> Result<PackedTransport, AssembleError> {
-    let transits = Transits::new(scene, dictionary, used_shapes);
-    let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
-    let covered = match config.coupling {
-        Coupling::Table => dictionary.paths.depths(),
-        Coupling::Lightfield => [0; 3],
-    };
     let layout = &scene.layout;
     let mut packer = TransportPacker::new(
         &scene.shapes,
@@ -63,6 +58,43 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
         config.transport_storage,
         config.negligible,
     );
+    follow_all(
+        scene,
+        dictionary,
+        used_shapes,
+        config,
+        |source, arrivals| {
+            for (doors, block, joint) in project(scene, used_shapes, arrivals) {
+                let place = |block: usize| layout.rank[block] as usize;
+                packer.add(&doors, place(block), place(source), &joint);
+                let bytes = packer.bytes();
+                if bytes > max_bytes {
+                    return Err(AssembleError::TooLarge {
+                        expected: config.max_bytes,
+                        found: config.max_bytes - max_bytes + bytes,
+                    });
+                }
+            }
+            Ok(())
+        },
+    )?;
+    Ok(packer.finish())
+}
+
+/// Gives `visit` each block with what its light becomes at the openings that it enters others by.
+fn follow_all<M: OperatorMatrix>(
+    scene: &Scene,
+    dictionary: &Dictionary<M>,
+    used_shapes: &[&ShapeOperators<M>],
+    config: &AssembleConfig,
+    mut visit: impl FnMut(usize, Arrivals) -> Result<(), AssembleError>,
+) -> Result<(), AssembleError> {
+    let transits = Transits::new(scene, dictionary, used_shapes);
+    let mut table = table::Table::new(scene, dictionary, used_shapes, &transits, config.max_depth);
+    let covered = match config.coupling {
+        Coupling::Table => dictionary.paths.depths(),
+        Coupling::Lightfield => [0; 3],
+    };
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let openings = || scene.blocks.iter().flat_map(|block| block.shape.openings);
     // Numbers of holes that a path of the scene may have, for the table's depths.
@@ -91,19 +123,41 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
                 add(&mut arrivals, key, responses);
             }
         }
-        for (doors, block, joint) in project(scene, used_shapes, arrivals) {
-            let place = |block: usize| layout.rank[block] as usize;
-            packer.add(&doors, place(block), place(source), &joint);
-            let bytes = packer.bytes();
-            if bytes > max_bytes {
-                return Err(AssembleError::TooLarge {
-                    expected: config.max_bytes,
-                    found: config.max_bytes - max_bytes + bytes,
-                });
-            }
-        }
+        visit(source, arrivals)?;
     }
-    Ok(packer.finish())
+    Ok(())
+}
+
+/// [`Arrivals`] of all blocks, for [`responses_by_opening`](crate::opening_responses::responses_by_opening).
+pub(crate) fn responses_by_opening<M: OperatorMatrix>(
+    scene: &Scene,
+    dictionary: &Dictionary<M>,
+    used_shapes: &[&ShapeOperators<M>],
+    config: &AssembleConfig,
+) -> Result<Vec<OpeningResponses>, AssembleError> {
+    let mut all = Vec::new();
+    follow_all(
+        scene,
+        dictionary,
+        used_shapes,
+        config,
+        |source, arrivals| {
+            for (key, responses) in arrivals {
+                let mut openings = scene.blocks[key.block].shape.openings.iter();
+                if let Some(opening) = openings.position(|o| o.face == key.face) {
+                    all.push(OpeningResponses {
+                        target: key.block,
+                        opening,
+                        exchanged: key.exchanged,
+                        source,
+                        responses,
+                    });
+                }
+            }
+            Ok(())
+        },
+    )?;
+    Ok(all)
 }
 
 /// Adds responses to those that enter at the same place.

@@ -87,8 +87,10 @@ pub enum ExactError {
         found: usize,
     },
     /// The level is too large, empty of texels, or the texel grid is.
-    #[error("the level has {found} texels; expected 1 to {MAX_TEXELS}")]
+    #[error("the level has {found} texels; expected 1 to {expected}")]
     TexelCount {
+        /// Most accepted.
+        expected: usize,
         /// Resolution squared times the number of walls.
         found: usize,
     },
@@ -182,6 +184,20 @@ impl ExactScene {
         sides: Vec<[Side; 6]>,
         resolution: usize,
     ) -> Result<Self, ExactError> {
+        Self::with_at_most(blocks, sides, resolution, MAX_TEXELS)
+    }
+
+    /// As [`ExactScene::new`], for a level of up to `max_texels`: for callers that store no [`transport::Transport`] but
+    /// take single rows of it ([`transport::irradiance_at`]).
+    ///
+    /// # Errors
+    /// As [`ExactScene::new`].
+    pub fn with_at_most(
+        blocks: Vec<Hexahedron>,
+        sides: Vec<[Side; 6]>,
+        resolution: usize,
+        max_texels: usize,
+    ) -> Result<Self, ExactError> {
         if sides.len() != blocks.len() {
             return Err(ExactError::SideCount {
                 expected: blocks.len(),
@@ -193,7 +209,7 @@ impl ExactScene {
             check.map_err(|source| ExactError::Warp { block, source })?;
         }
         check_openings(&blocks, &sides)?;
-        let walls = list_walls(&sides, resolution)?;
+        let walls = list_walls(&sides, resolution, max_texels)?;
         let facets = blocks.iter().map(block_facets).collect();
         let mut scene = Self {
             blocks,
@@ -347,15 +363,19 @@ fn check_openings(blocks: &[Hexahedron], sides: &[[Side; 6]]) -> Result<(), Exac
     Ok(())
 }
 
-fn list_walls(sides: &[[Side; 6]], resolution: usize) -> Result<Vec<Wall>, ExactError> {
+fn list_walls(
+    sides: &[[Side; 6]],
+    resolution: usize,
+    expected: usize,
+) -> Result<Vec<Wall>, ExactError> {
     let walls: Vec<(usize, Face)> = (0..sides.len())
         .flat_map(|block| Face::ALL.map(|face| (block, face)))
         .filter(|&(block, face)| sides[block][face.index()] == Side::Wall)
         .collect();
     let texels = resolution.saturating_mul(resolution);
     let found = texels.saturating_mul(walls.len());
-    if found == 0 || found > MAX_TEXELS {
-        return Err(ExactError::TexelCount { found });
+    if found == 0 || found > expected {
+        return Err(ExactError::TexelCount { expected, found });
     }
     let indexed = walls.into_iter().enumerate();
     Ok(indexed

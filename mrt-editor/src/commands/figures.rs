@@ -1,9 +1,9 @@
 //! `mrt figures`: draws the pictures that explain the method, those of `docs/FIGURES.md`.
 
 mod basis;
-mod canvas;
+pub(crate) mod canvas;
 mod hops;
-mod plot;
+pub(crate) mod plot;
 mod probes;
 mod room;
 mod spectra;

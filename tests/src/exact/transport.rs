@@ -105,24 +105,64 @@ impl Transport {
     pub fn irradiance(&self, radiosity: &[Quarters]) -> Result<Vec<f64>, ExactError> {
         check_length("radiosity", self.rows.len(), radiosity.len())?;
         let means: Vec<f64> = radiosity.iter().map(mean_of_quarters).collect();
-        let gather = |row: &Row| {
-            let mut sum = 0.0;
-            let mut values = row.values.as_slice();
-            for &(start, length) in &row.runs {
-                let (run, rest) = values.split_at(length as usize);
-                values = rest;
-                sum += run_product(run, &means[start as usize..(start + length) as usize]);
-            }
-            for (sender, factors) in &row.near {
-                let sender = *sender as usize;
-                for (&factor, quarter) in factors.iter().zip(radiosity[sender]) {
-                    sum += f64::from(factor) * (quarter - means[sender]);
-                }
-            }
-            sum
-        };
-        Ok(self.rows.par_iter().map(gather).collect())
+        let rows = self.rows.par_iter();
+        Ok(rows.map(|row| row.gather(&means, radiosity)).collect())
     }
+}
+
+impl Row {
+    /// Irradiance from the radiosity of every texel's quarters and their means.
+    fn gather(&self, means: &[f64], radiosity: &[Quarters]) -> f64 {
+        let mut sum = 0.0;
+        let mut values = self.values.as_slice();
+        for &(start, length) in &self.runs {
+            let (run, rest) = values.split_at(length as usize);
+            values = rest;
+            sum += run_product(run, &means[start as usize..(start + length) as usize]);
+        }
+        for (sender, factors) in &self.near {
+            let sender = *sender as usize;
+            for (&factor, quarter) in factors.iter().zip(radiosity[sender]) {
+                sum += f64::from(factor) * (quarter - means[sender]);
+            }
+        }
+        sum
+    }
+}
+
+/// Irradiance at the centres of some texels only, from several radiosities, without storing the transport: one vector
+/// a receiver, with one value a radiosity.
+///
+/// # Errors
+/// [`ExactError::Length`].
+///
+/// # Panics
+/// If the scene has no such receiver.
+pub fn irradiance_at(
+    scene: &ExactScene,
+    receivers: &[usize],
+    radiosities: &[Vec<Quarters>],
+) -> Result<Vec<Vec<f64>>, ExactError> {
+    for radiosity in radiosities {
+        check_length("radiosity", scene.texel_count(), radiosity.len())?;
+    }
+    let corners: Vec<Vec<DVec3>> = scene.walls.iter().map(|w| grid(scene, w)).collect();
+    let texels_per_wall = scene.resolution * scene.resolution;
+    let means: Vec<Vec<f64>> = radiosities
+        .iter()
+        .map(|radiosity| radiosity.iter().map(mean_of_quarters).collect())
+        .collect();
+    Ok(receivers
+        .par_iter()
+        .map_init(
+            || Gather::new(scene, &corners),
+            |gather, &texel| {
+                let row = gather.row(texel, texel / texels_per_wall);
+                let pairs = means.iter().zip(radiosities);
+                pairs.map(|(means, r)| row.gather(means, r)).collect()
+            },
+        )
+        .collect())
 }
 
 /// Values of the four quarters of a texel, at (u, v) = (low, low), (high, low), (low, high),

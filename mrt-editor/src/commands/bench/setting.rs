@@ -1,0 +1,107 @@
+//! What is measured: mazes and their lights, the same on every machine.
+
+use glam::{DVec3, Vec3};
+use mrt_core::sampling::hash;
+use mrt_runtime::level::Level;
+use mrt_runtime::light::Light;
+use mrt_runtime::maze::maze;
+
+/// Of all mazes.
+const SEED: u64 = 41;
+
+/// Of all walls: three channels that differ.
+pub const ALBEDO: Vec3 = Vec3::new(0.8, 0.6, 0.4);
+
+/// Blocks that share a light, and lights at most: direct light asks every light at every texel.
+const BLOCKS_PER_LIGHT: usize = 10;
+const MOST_LIGHTS: usize = 16;
+
+/// Of lights, in blocks: what the lights of a dictionary's prior have.
+const RADIUS: f32 = 0.1;
+
+/// Of lights: how far from the middle of a block, in blocks, which leaves a quarter of one to the walls.
+const JITTER: f64 = 0.25;
+
+/// A lit maze.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    /// Such as "maze41".
+    pub name: String,
+    /// The maze.
+    pub level: Level,
+    /// Sphere lights of several colours, each in a block of its own.
+    pub lights: Vec<Light>,
+}
+
+impl Setting {
+    /// A maze of so many blocks with so many lights, or one for each ten blocks, at most 16.
+    pub fn new(blocks: usize, lights: Option<usize>) -> Self {
+        let level = maze(blocks, ALBEDO, SEED);
+        let count = level.blocks.len();
+        let usual = (count / BLOCKS_PER_LIGHT).clamp(1, MOST_LIGHTS);
+        let lights = lights.unwrap_or(usual).clamp(1, count);
+        let place = |light: usize| {
+            let block = (2 * light + 1) * count / (2 * lights);
+            let jitter = |axis: u32| {
+                let unit = f64::from(hash(light as u32, axis)) / f64::from(u32::MAX);
+                (2.0 * unit - 1.0) * JITTER
+            };
+            let offset = DVec3::new(jitter(0), jitter(1), jitter(2));
+            Light::Sphere {
+                position: (level.blocks[block].warp.center() + offset).as_vec3(),
+                radius: RADIUS,
+                intensity: COLOURS[light % COLOURS.len()],
+            }
+        };
+        Self {
+            name: format!("maze{blocks}"),
+            lights: (0..lights).map(place).collect(),
+            level,
+        }
+    }
+
+    /// Position, radius and intensity of each light.
+    pub fn spheres(&self) -> Vec<(Vec3, f32, Vec3)> {
+        let sphere = |light: &Light| match *light {
+            Light::Sphere {
+                position,
+                radius,
+                intensity,
+            } => Some((position, radius, intensity)),
+            _ => None,
+        };
+        self.lights.iter().filter_map(sphere).collect()
+    }
+}
+
+const COLOURS: [Vec3; 4] = [
+    Vec3::new(1.0, 0.9, 0.8),
+    Vec3::new(0.6, 0.8, 1.0),
+    Vec3::new(1.0, 0.7, 0.4),
+    Vec3::new(0.8, 1.0, 0.7),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_light_is_in_a_block_of_its_own() {
+        for blocks in [1, 5, 41, 300] {
+            let setting = Setting::new(blocks, None);
+            let mut lit: Vec<usize> = setting
+                .spheres()
+                .iter()
+                .filter_map(|(position, ..)| {
+                    let mut all = setting.level.blocks.iter();
+                    all.position(|b| b.warp.contains(position.as_dvec3(), 0.0))
+                })
+                .collect();
+            assert_eq!(lit.len(), setting.lights.len());
+            lit.dedup();
+            assert_eq!(lit.len(), setting.lights.len());
+        }
+        assert_eq!(Setting::new(41, None).lights.len(), 4);
+        assert_eq!(Setting::new(5, Some(9)).lights.len(), 5);
+    }
+}
