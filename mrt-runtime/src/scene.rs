@@ -276,6 +276,16 @@ impl Planes {
         Vec3::from_array(std::array::from_fn(|c| self.values[c * self.slots + slot]))
     }
 
+    /// The value of all slots that have a texel, if they have the same.
+    pub(crate) fn uniform(&self, slots: Range<usize>, texel_of_slot: &[u32]) -> Option<Vec3> {
+        let texels = slots
+            .zip(texel_of_slot)
+            .filter(|&(_, &texel)| texel != u32::MAX);
+        let mut values = texels.map(|(slot, _)| self.get(slot));
+        let first = values.next()?;
+        values.all(|value| value == first).then_some(first)
+    }
+
     pub(crate) fn set(&mut self, slot: usize, value: Vec3) {
         for (c, x) in value.to_array().into_iter().enumerate() {
             self.values[c * self.slots + slot] = x;
@@ -294,6 +304,8 @@ pub struct Surface {
     pub(crate) normals: Planes,
     /// Linear RGB albedo.
     pub(crate) albedo: Planes,
+    /// By place: the albedo of all texels, where they have the same.
+    pub(crate) uniform: Vec<Option<Vec3>>,
     /// Radiosity that texels emit of themselves, linear RGB, W/m².
     pub(crate) emission: Planes,
     /// Places of blocks some texel of which emits, ascending.
@@ -341,6 +353,12 @@ impl Scene {
     pub fn set_texel_albedo(&mut self, block: usize, albedo: &[Vec3]) -> Result<(), SurfaceError> {
         self.check_surface(block, albedo, "albedo", 1.0)?;
         self.write_surface(block, albedo, |surface| &mut surface.albedo);
+        let place = self.layout.rank[block] as usize;
+        let texels = &self.shapes[self.blocks[block].shape_index]
+            .folding
+            .texel_of_slot;
+        let slots = self.layout.slots[place].clone();
+        self.surface.uniform[place] = self.surface.albedo.uniform(slots, texels);
         Ok(())
     }
 

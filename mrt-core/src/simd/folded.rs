@@ -10,7 +10,6 @@
     reason = "bounds are checked once a call, not once a number"
 )]
 
-use super::tiles::{CHANNELS, TILE, TileSums};
 use super::{Lanes, WIDEST};
 
 /// Sums and differences of mirrored parts, each mirror in turn.
@@ -31,6 +30,15 @@ fn butterflies<L: Lanes, const GROUP: usize>(l: L, v: &mut [L::V; GROUP]) {
     }
 }
 
+/// Albedo of a surface.
+#[derive(Clone, Copy, Debug)]
+pub enum Albedo<'a> {
+    /// The same everywhere that there is light.
+    Uniform(f32),
+    /// One number a number of light.
+    Each(&'a [f32]),
+}
+
 /// What a surface sends out, one channel: `albedo (direct + indirect) + emission`.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflected<'a> {
@@ -39,7 +47,7 @@ pub struct Reflected<'a> {
     /// More of it, or none.
     pub indirect: Option<&'a [f32]>,
     /// In [0, 1].
-    pub albedo: &'a [f32],
+    pub albedo: Albedo<'a>,
     /// Radiosity, or none.
     pub emission: Option<&'a [f32]>,
 }
@@ -74,7 +82,11 @@ fn fold_with<L: Lanes, const GROUP: usize, const INDIRECT: bool, const EMISSION:
     apart: usize,
 ) -> [f32; 2] {
     let stride = weight.len();
-    let (direct, albedo) = (light.direct, light.albedo);
+    let direct = light.direct;
+    let (albedo, uniform) = match light.albedo {
+        Albedo::Uniform(albedo) => (direct, Some(l.splat(albedo))),
+        Albedo::Each(albedo) => (albedo, None),
+    };
     let indirect = light.indirect.unwrap_or(direct);
     let emission = light.emission.unwrap_or(direct);
     for signal in [direct, albedo, indirect, emission] {
@@ -90,7 +102,10 @@ fn fold_with<L: Lanes, const GROUP: usize, const INDIRECT: bool, const EMISSION:
             let k = element * stride + at;
             // SAFETY: element < GROUP and at + N <= stride, so k + N <= GROUP * stride, the length of every signal.
             unsafe {
-                let albedo = l.load_unchecked(albedo, k);
+                let albedo = match uniform {
+                    Some(albedo) => albedo,
+                    None => l.load_unchecked(albedo, k),
+                };
                 let mut sum = if EMISSION {
                     let emission = l.load_unchecked(emission, k);
                     l.mul_add(albedo, l.load_unchecked(direct, k), emission)
@@ -124,7 +139,6 @@ fn fold_with<L: Lanes, const GROUP: usize, const INDIRECT: bool, const EMISSION:
 /// What [`unfold`] finds out, lane by lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Unfolded<L: Lanes> {
-    sum: [L::V; CHANNELS],
     change: L::V,
     peak: L::V,
 }
@@ -134,16 +148,9 @@ impl<L: Lanes> Unfolded<L> {
     #[inline(always)]
     pub fn new(l: L) -> Self {
         Self {
-            sum: [l.splat(0.0); CHANNELS],
             change: l.splat(0.0),
             peak: l.splat(0.0),
         }
-    }
-
-    /// Sum of a channel by weight.
-    #[inline(always)]
-    pub fn sum(&self, l: L, channel: usize) -> f32 {
-        l.sum(self.sum[channel])
     }
 
     /// Largest change of a number and largest number, if changes were looked for.
@@ -153,52 +160,52 @@ impl<L: Lanes> Unfolded<L> {
     }
 }
 
-/// Signals from the classes of a tile: writes [`TILE`] numbers of each part, from position `first` on, negative ones as
-/// zero. With `COMPARE`, looks at what was there before.
+/// One channel of a signal from its classes, which lie `apart` numbers from one another; negative numbers become zero.
+/// With `COMPARE`, looks at what was there before.
 ///
 /// # Panics
-/// If a signal is not `GROUP` times as long as `weight`, or the tile ends beyond that.
+/// If the signal is not `GROUP` times as long as `weight`, that is no multiple of [`WIDEST`], or `folded` is too short.
 #[inline(always)]
 pub fn unfold<L: Lanes, const GROUP: usize, const COMPARE: bool>(
     l: L,
-    classes: [&TileSums; GROUP],
-    first: usize,
+    folded: &[f32],
+    apart: usize,
     weight: &[f32],
-    signals: &mut [&mut [f32]; CHANNELS],
+    signal: &mut [f32],
     found: &mut Unfolded<L>,
-) {
+) -> f32 {
     let stride = weight.len();
-    assert!(first + TILE <= stride);
     let zero = l.splat(0.0);
-    for (channel, signal) in signals.iter_mut().enumerate() {
-        assert_eq!(signal.len(), GROUP * stride, "numbers of a signal");
-        let mut lane = 0;
-        while lane < TILE {
-            let mut v = [zero; GROUP];
-            for (class, v) in v.iter_mut().enumerate() {
-                // SAFETY: lane + N <= TILE, the length of a channel's sums.
-                *v = unsafe { l.load_unchecked(&classes[class][channel], lane) };
-            }
-            butterflies::<L, GROUP>(l, &mut v);
-            let mut sum = zero;
-            for (element, v) in v.iter().enumerate() {
-                let at = element * stride + first + lane;
-                let now = l.max(*v, zero);
-                // SAFETY: first + lane + N <= stride, so at + N <= GROUP * stride.
-                unsafe {
-                    if COMPARE {
-                        let change = l.abs(l.sub(now, l.load_unchecked(signal, at)));
-                        found.change = l.max(change, found.change);
-                        found.peak = l.max(now, found.peak);
-                    }
-                    l.store_unchecked(signal, at, now);
-                }
-                sum = l.add(sum, now);
-            }
-            // SAFETY: first + lane + N <= stride.
-            let weight = unsafe { l.load_unchecked(weight, first + lane) };
-            found.sum[channel] = l.mul_add(sum, weight, found.sum[channel]);
-            lane += L::N;
+    let mut total = zero;
+    assert_eq!(signal.len(), GROUP * stride, "numbers of a signal");
+    assert!(stride.is_multiple_of(WIDEST) && folded.len() >= (GROUP - 1) * apart + stride);
+    let mut at = 0;
+    while at < stride {
+        let mut v = [zero; GROUP];
+        for (class, v) in v.iter_mut().enumerate() {
+            // SAFETY: the last class ends at (GROUP - 1) * apart + stride, and at + N <= stride.
+            *v = unsafe { l.load_unchecked(folded, class * apart + at) };
         }
+        butterflies::<L, GROUP>(l, &mut v);
+        let mut sum = zero;
+        for (element, v) in v.iter().enumerate() {
+            let at = element * stride + at;
+            let now = l.max(*v, zero);
+            // SAFETY: at + N <= GROUP * stride.
+            unsafe {
+                if COMPARE {
+                    let change = l.abs(l.sub(now, l.load_unchecked(signal, at)));
+                    found.change = l.max(change, found.change);
+                    found.peak = l.max(now, found.peak);
+                }
+                l.store_unchecked(signal, at, now);
+            }
+            sum = l.add(sum, now);
+        }
+        // SAFETY: at + N <= stride.
+        let weight = unsafe { l.load_unchecked(weight, at) };
+        total = l.mul_add(sum, weight, total);
+        at += L::N;
     }
+    l.sum(total)
 }

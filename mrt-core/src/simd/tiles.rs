@@ -27,6 +27,8 @@ pub const CHANNELS: usize = 3;
 pub trait Element: Copy + Send + Sync + 'static {
     /// Whether loading takes more than a load.
     const CONVERTED: bool = true;
+    /// Whether columns may have scales.
+    const SCALED: bool = false;
     /// Loads `L::N` of them as `f32`, without scale.
     fn load<L: Lanes>(lanes: L, from: &[Self]) -> L::V;
 }
@@ -49,6 +51,8 @@ impl Element for u16 {
 }
 
 impl Element for i8 {
+    const SCALED: bool = true;
+
     #[inline(always)]
     fn load<L: Lanes>(lanes: L, from: &[i8]) -> L::V {
         lanes.load_i8(from)
@@ -132,8 +136,8 @@ impl Columns<'_> {
     }
 }
 
-/// The sums of one tile: channel by channel, [`TILE`] rows each; a half tile uses the first [`HALF_TILE`].
-pub type TileSums = [[f32; TILE]; CHANNELS];
+/// Where the sums of a tile go: for each channel at least as many numbers as the tile has rows.
+pub type TileOut<'a> = [&'a mut [f32]; CHANNELS];
 
 /// A panel of a tile's columns, and what they are multiplied by.
 #[derive(Clone, Copy, Debug)]
@@ -144,74 +148,86 @@ pub struct Term<'a, E, const PANELS: usize = 1> {
     pub columns: Columns<'a>,
     /// The right-hand sides.
     pub x: Rgb<'a>,
+    /// For `int8` one a column, or empty: what each column is multiplied by. Other numbers have none.
+    pub scales: &'a [f32],
 }
 
-/// `sums += panel * x[columns]` over all terms, for a tile of [`TILE`] rows.
+/// `sums = panel * x[columns]` over all terms, for a tile of [`TILE`] rows.
 ///
 /// # Panics
 /// If a panel does not have a tile of numbers for each column, or `x` is shorter than any of the lists of columns allows.
 #[inline(always)]
-pub fn add_tile<'a, L: Lanes, E: Element>(
+pub fn sum_tile<'a, L: Lanes, E: Element>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
-    sums: &mut TileSums,
+    sums: TileOut<'_>,
 ) {
     match L::N {
-        4 => add_rows::<L, E, 1, 4, 1, TILE>(l, terms, [sums]),
+        4 => sum_rows::<L, E, 1, 4, 1, TILE>(l, terms, [sums]),
         // What is converted on loading takes a register more, and with twelve sums one would live in memory.
-        8 if E::CONVERTED => add_rows::<L, E, 1, 2, 1, TILE>(l, terms, [sums]),
-        8 => add_rows::<L, E, 1, 2, 2, TILE>(l, terms, [sums]),
-        16 => add_rows::<L, E, 1, 1, 4, TILE>(l, terms, [sums]),
-        _ => add_rows_one_by_one::<L, E, TILE>(l, terms, sums),
+        8 if E::CONVERTED => sum_rows::<L, E, 1, 2, 1, TILE>(l, terms, [sums]),
+        8 => sum_rows::<L, E, 1, 2, 2, TILE>(l, terms, [sums]),
+        16 => sum_rows::<L, E, 1, 1, 4, TILE>(l, terms, [sums]),
+        _ => sum_rows_one_by_one::<L, E, TILE>(l, terms, sums),
     }
 }
 
-/// [`add_tile`] for two tiles with the same columns, and one term: half the loads of `x`.
+/// [`sum_tile`] for two tiles with the same columns, and one term: half the loads of `x`.
 ///
 /// # Panics
-/// As [`add_tile`].
+/// As [`sum_tile`].
 #[inline(always)]
-pub fn add_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [&mut TileSums; 2]) {
+pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [TileOut<'_>; 2]) {
     let once = std::iter::once(term);
     match L::N {
-        8 => add_rows::<L, E, 2, 2, 1, TILE>(l, once, sums),
-        16 => add_rows::<L, E, 2, 1, 2, TILE>(l, once, sums),
+        8 => sum_rows::<L, E, 2, 2, 1, TILE>(l, once, sums),
+        16 => sum_rows::<L, E, 2, 1, 2, TILE>(l, once, sums),
         // Four lanes would need more registers than there are.
         _ => {
             let [first, second] = sums;
-            let Term { panels, columns, x } = term;
+            let Term {
+                panels,
+                columns,
+                x,
+                scales,
+            } = term;
             let half = |k: usize| {
                 let panels = [panels[k]];
-                std::iter::once(Term { panels, columns, x })
+                std::iter::once(Term {
+                    panels,
+                    columns,
+                    x,
+                    scales,
+                })
             };
-            add_tile(l, half(0), first);
-            add_tile(l, half(1), second);
+            sum_tile(l, half(0), first);
+            sum_tile(l, half(1), second);
         }
     }
 }
 
-/// [`add_tile`] for a tile of [`HALF_TILE`] rows.
+/// [`sum_tile`] for a tile of [`HALF_TILE`] rows.
 ///
 /// # Panics
-/// As [`add_tile`].
+/// As [`sum_tile`].
 #[inline(always)]
-pub fn add_half_tile<'a, L: Lanes, E: Element>(
+pub fn sum_half_tile<'a, L: Lanes, E: Element>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
-    sums: &mut TileSums,
+    sums: TileOut<'_>,
 ) {
     let l = l.narrow();
     match <L::Narrow as Lanes>::N {
-        4 => add_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, [sums]),
-        8 => add_rows::<_, E, 1, 1, 4, HALF_TILE>(l, terms, [sums]),
-        _ => add_rows_one_by_one::<_, E, HALF_TILE>(l, terms, sums),
+        4 => sum_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, [sums]),
+        8 => sum_rows::<_, E, 1, 1, 4, HALF_TILE>(l, terms, [sums]),
+        _ => sum_rows_one_by_one::<_, E, HALF_TILE>(l, terms, sums),
     }
 }
 
 /// `VECTORS` vectors make the `ROWS` of each of `PANELS` panels; `SETS` columns go to sums of their own, so that enough
 /// products are under way at once to hide the time that each takes.
 #[inline(always)]
-fn add_rows<
+fn sum_rows<
     'a,
     L: Lanes,
     E: Element,
@@ -222,23 +238,56 @@ fn add_rows<
 >(
     l: L,
     terms: impl Iterator<Item = Term<'a, E, PANELS>>,
-    sums: [&mut TileSums; PANELS],
+    sums: [TileOut<'_>; PANELS],
 ) {
     assert_eq!(VECTORS * L::N, ROWS);
     let mut acc = [[[[l.splat(0.0); VECTORS]; CHANNELS]; PANELS]; SETS];
-    for Term { panels, columns, x } in terms {
+    for Term {
+        panels,
+        columns,
+        x,
+        scales,
+    } in terms
+    {
         let count = columns.indices.len();
         assert!(x.has(columns.limit));
+        assert!(scales.is_empty() || scales.len() >= count);
         for panel in panels {
             assert!(panel.len() >= count * ROWS);
         }
         let whole = count / SETS * SETS;
         let mut k = 0;
+        if E::SCALED && !scales.is_empty() {
+            while k < count {
+                // SAFETY: k < count, and all else was checked above.
+                unsafe {
+                    let scale = *scales.get_unchecked(k);
+                    add_column::<L, E, PANELS, VECTORS, ROWS>(
+                        l,
+                        panels,
+                        columns,
+                        k,
+                        x,
+                        scale,
+                        &mut acc[0],
+                    );
+                }
+                k += 1;
+            }
+        }
         while k < whole {
             for (set, acc) in acc.iter_mut().enumerate() {
                 // SAFETY: k + set < count, and all else was checked above.
                 unsafe {
-                    add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k + set, x, acc);
+                    add_column::<L, E, PANELS, VECTORS, ROWS>(
+                        l,
+                        panels,
+                        columns,
+                        k + set,
+                        x,
+                        1.0,
+                        acc,
+                    );
                 }
             }
             k += SETS;
@@ -246,27 +295,34 @@ fn add_rows<
         while k < count {
             // SAFETY: as above.
             unsafe {
-                add_column::<L, E, PANELS, VECTORS, ROWS>(l, panels, columns, k, x, &mut acc[0]);
+                add_column::<L, E, PANELS, VECTORS, ROWS>(
+                    l,
+                    panels,
+                    columns,
+                    k,
+                    x,
+                    1.0,
+                    &mut acc[0],
+                );
             }
             k += 1;
         }
     }
     for (panel, sums) in sums.into_iter().enumerate() {
-        for channel in 0..CHANNELS {
+        for (channel, out) in sums.into_iter().enumerate() {
+            let out = &mut out[..ROWS];
             for v in 0..VECTORS {
                 let mut sum = acc[0][panel][channel][v];
                 for other in &acc[1..] {
                     sum = l.add(sum, other[panel][channel][v]);
                 }
-                let at = &mut sums[channel][v * L::N..(v + 1) * L::N];
-                let before = l.load(at);
-                l.store(at, l.add(before, sum));
+                l.store(&mut out[v * L::N..(v + 1) * L::N], sum);
             }
         }
     }
 }
 
-/// `acc += panel[k] * x[columns[k]]`.
+/// `acc += panel[k] * scale * x[columns[k]]`, the scale for `int8` only.
 ///
 /// # Safety
 /// `k` is below the number of columns, each panel has `ROWS` numbers for each of them, `VECTORS` vectors make `ROWS`, and
@@ -284,6 +340,7 @@ unsafe fn add_column<
     columns: Columns<'_>,
     k: usize,
     x: Rgb<'_>,
+    scale: f32,
     acc: &mut [[[L::V; VECTORS]; CHANNELS]; PANELS],
 ) {
     // SAFETY: the caller's promises.
@@ -292,7 +349,15 @@ unsafe fn add_column<
         let at = |channel: usize| *x.values.get_unchecked(channel * x.stride + column);
         (at(0), at(1), at(2))
     };
-    let x = [l.splat(red), l.splat(green), l.splat(blue)];
+    let x = if E::SCALED {
+        [
+            l.splat(red * scale),
+            l.splat(green * scale),
+            l.splat(blue * scale),
+        ]
+    } else {
+        [l.splat(red), l.splat(green), l.splat(blue)]
+    };
     for (panel, acc) in panels.iter().zip(acc) {
         #[allow(
             clippy::needless_range_loop,
@@ -311,22 +376,33 @@ unsafe fn add_column<
 
 /// The reference: each sum in the order of the columns.
 #[inline(always)]
-fn add_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
+fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
-    sums: &mut TileSums,
+    sums: TileOut<'_>,
 ) {
     assert_eq!(L::N, 1);
-    for Term { panels, columns, x } in terms {
+    let [red, green, blue] = sums;
+    let mut sums = [&mut red[..ROWS], &mut green[..ROWS], &mut blue[..ROWS]];
+    for sums in &mut sums {
+        sums.fill(0.0);
+    }
+    for Term {
+        panels,
+        columns,
+        x,
+        scales,
+    } in terms
+    {
         let panel = &panels[0][..columns.indices.len() * ROWS];
-        assert!(x.has(columns.limit));
         for (channel, sums) in sums.iter_mut().enumerate() {
             let x = &x.values[channel * x.stride..];
-            for (row, sum) in sums[..ROWS].iter_mut().enumerate() {
+            for (row, sum) in sums.iter_mut().enumerate() {
                 let mut acc = l.splat(0.0);
                 for (k, &column) in columns.indices.iter().enumerate() {
                     let a = E::load(l, &panel[k * ROWS + row..]);
-                    acc = l.mul_add(a, l.splat(x[column as usize]), acc);
+                    let scale = scales.get(k).copied().unwrap_or(1.0);
+                    acc = l.mul_add(a, l.splat(x[column as usize] * scale), acc);
                 }
                 *sum += l.sum(acc);
             }

@@ -1,16 +1,13 @@
 //! The two products of a pass, one block at a time.
 
 use crate::packed::{PackedShape, PackedTransport, TransportEntry, Values};
-use mrt_core::simd::folded::{Reflected, Unfolded, fold, unfold};
+use glam::Vec3;
+use mrt_core::simd::folded::{Albedo, Reflected, Unfolded, fold, unfold};
 use mrt_core::simd::tiles::{
-    CHANNELS, ColumnLists, Columns, DOT_ROWS, Element, Rgb, TILE, Term, TileSums, add_half_tile,
-    add_tile, add_two_tiles, dot_rows,
+    CHANNELS, DOT_ROWS, Element, Rgb, TILE, Term, dot_rows, sum_half_tile, sum_tile, sum_two_tiles,
 };
 use mrt_core::simd::{Kernel, Lanes, WIDEST};
 use std::ops::Range;
-
-/// Classes of a shape with three mirrors.
-const MAX_CLASSES: usize = 8;
 
 /// What kernels of one task write on the way.
 #[derive(Clone, Debug)]
@@ -19,19 +16,14 @@ pub(crate) struct Scratch {
     folded: Vec<f32>,
     /// Coefficients times scales.
     scaled: Vec<f32>,
-    /// Columns 0, 1, 2 ...
-    counting: ColumnLists,
 }
 
 impl Scratch {
     /// For blocks of so many slots, and so many coefficients a channel.
     pub(super) fn new(slots: usize, coefficients: usize) -> Self {
-        let mut counting = ColumnLists::default();
-        counting.push((0..coefficients).map(|k| k as u32));
         Self {
             folded: vec![0.0; CHANNELS * slots],
             scaled: vec![0.0; CHANNELS * coefficients],
-            counting,
         }
     }
 }
@@ -45,6 +37,8 @@ pub(super) struct CoefficientsOf<'a> {
     pub direct: [&'a [f32]; CHANNELS],
     pub indirect: Option<[&'a [f32]; CHANNELS]>,
     pub albedo: [&'a [f32]; CHANNELS],
+    /// The albedo of all texels, if they have the same.
+    pub uniform: Option<Vec3>,
     pub emission: Option<[&'a [f32]; CHANNELS]>,
     pub scratch: &'a mut Scratch,
     /// Channel by channel.
@@ -89,7 +83,10 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
         let light = Reflected {
             direct: block.direct[channel],
             indirect: block.indirect.map(|i| i[channel]),
-            albedo: block.albedo[channel],
+            albedo: match block.uniform {
+                Some(albedo) => Albedo::Uniform(albedo[channel]),
+                None => Albedo::Each(block.albedo[channel]),
+            },
             emission: block.emission.map(|e| e[channel]),
         };
         let folded = &mut block.scratch.folded[channel * stride..];
@@ -133,7 +130,6 @@ pub(super) struct ResponsesOf<'a> {
     /// Whether a block has any.
     pub has_coefficients: &'a [bool],
     pub gate_values: &'a [f32],
-    pub scratch: &'a mut Scratch,
     /// Joint coefficients of this block.
     pub joint: &'a mut [f32],
 }
@@ -206,58 +202,70 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
     let tiles = &transport.tiles[tiles.start as usize..tiles.end as usize];
     for (tile, row_tile) in tiles.iter().zip(&block.shape.row_tiles) {
         let rows = usize::from(row_tile.height);
-        let mut sums: TileSums = [[0.0; TILE]; CHANNELS];
+        let mut sums = [[0.0f32; TILE]; CHANNELS];
         let entries = &transport.entries[tile.entries.start as usize..tile.entries.end as usize];
         // Gated ones come first.
-        let steady = if transport.column_scales.is_empty() {
-            entries.partition_point(|entry| entry.gate != u32::MAX)
-        } else {
-            entries.len()
-        };
-        for entry in &entries[..steady] {
-            let factor = match entry.gate {
-                u32::MAX => 1.0,
-                gate => block.gate_values[gate as usize],
-            };
+        let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
+        let mut behind_doors = [[0.0f32; TILE]; CHANNELS];
+        for entry in &entries[..gated] {
+            let factor = block.gate_values[entry.gate as usize];
             if factor == 0.0 || !block.has_coefficients[entry.source as usize] {
                 continue;
             }
             let columns = entry.columns.start as usize..entry.columns.end as usize;
-            let scales = transport.column_scales.get(columns.clone());
-            let scratch = &mut *block.scratch;
-            let indices = transport.columns.get(columns.clone());
-            let x = &block.coefficients[..];
-            scale_columns(indices, x, mode_stride, factor, scales, &mut scratch.scaled);
-            let place = scratch.scaled.len() / CHANNELS;
-            let scaled = Term {
+            let term = Term {
                 panels: [&values[entry.start as usize..][..columns.len() * rows]],
-                columns: scratch.counting.get(0..columns.len()),
-                x: Rgb::new(&scratch.scaled, place),
+                columns: transport.columns.get(columns.clone()),
+                x: Rgb::new(block.coefficients, mode_stride),
+                scales: transport.column_scales.get(columns).unwrap_or(&[]),
             };
-            add_terms(l, std::iter::once(scaled), rows, &mut sums);
+            sum_terms(l, std::iter::once(term), rows, &mut sums);
+            for (to, from) in behind_doors
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(sums.as_flattened())
+            {
+                *to += factor * from;
+            }
         }
         let runs = LitRuns {
-            entries: &entries[steady..],
+            entries: &entries[gated..],
             has_coefficients: block.has_coefficients,
         };
         let x = Rgb::new(block.coefficients, mode_stride);
         let lit = runs.map(|(columns, start)| Term {
             panels: [&values[start..start + columns.len() * rows]],
-            columns: transport.columns.get(columns),
+            columns: transport.columns.get(columns.clone()),
             x,
+            scales: transport.column_scales.get(columns).unwrap_or(&[]),
         });
-        add_terms(l, lit, rows, &mut sums);
+        sum_terms(l, lit, rows, &mut sums);
+        if gated > 0 {
+            for (to, from) in sums
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(behind_doors.as_flattened())
+            {
+                *to += from;
+            }
+        }
         let first = usize::from(row_tile.start);
-        let modes = &block.shape.row_order[first..first + usize::from(row_tile.count)];
+        let of_tile = first..first + usize::from(row_tile.count);
+        let modes = &block.shape.row_order[of_tile.clone()];
+        let inverses = &block.shape.row_inverses[of_tile];
         for (channel, sums) in sums.iter().enumerate() {
             let joint = &mut block.joint[channel * place..(channel + 1) * place];
-            let own = &own[channel * mode_stride..][..block.shape.modes];
-            for (&mode, &sum) in modes.iter().zip(sums) {
-                let mode = usize::from(mode);
-                let sum = sum * (tile.scale / block.shape.row_units[mode]);
-                // The first joint modes are the block's own.
-                joint[mode] = sum + own.get(mode).copied().unwrap_or(0.0);
+            for ((&mode, inverse), sum) in modes.iter().zip(inverses).zip(sums) {
+                joint[usize::from(mode)] = sum * (tile.scale * inverse);
             }
+        }
+    }
+    // The first joint modes are the block's own.
+    for channel in 0..CHANNELS {
+        let joint = &mut block.joint[channel * place..(channel + 1) * place];
+        let own = &own[channel * mode_stride..][..block.shape.modes];
+        for (joint, own) in joint.iter_mut().zip(own) {
+            *joint += own;
         }
     }
 }
@@ -288,37 +296,18 @@ impl Iterator for LitRuns<'_> {
 }
 
 #[inline(always)]
-fn add_terms<'a, L: Lanes, E: Element>(
+fn sum_terms<'a, L: Lanes, E: Element>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     rows: usize,
-    sums: &mut TileSums,
+    sums: &mut [[f32; TILE]; CHANNELS],
 ) {
+    let [red, green, blue] = sums;
+    let sums = [&mut red[..], &mut green[..], &mut blue[..]];
     if rows == TILE {
-        add_tile(l, terms, sums);
+        sum_tile(l, terms, sums);
     } else {
-        add_half_tile(l, terms, sums);
-    }
-}
-
-/// `out[k] = factor * scales[k] * x[columns[k]]`, channel by channel.
-#[inline(always)]
-fn scale_columns(
-    columns: Columns<'_>,
-    x: &[f32],
-    stride: usize,
-    factor: f32,
-    scales: Option<&[f32]>,
-    out: &mut [f32],
-) {
-    let place = out.len() / CHANNELS;
-    for channel in 0..CHANNELS {
-        let x = &x[channel * stride..];
-        let out = &mut out[channel * place..(channel + 1) * place];
-        for (k, &column) in columns.indices().iter().enumerate() {
-            let scale = scales.and_then(|scales| scales.get(k)).unwrap_or(&1.0);
-            out[k] = x[column as usize] * factor * scale;
-        }
+        sum_half_tile(l, terms, sums);
     }
 }
 
@@ -330,47 +319,62 @@ fn expand<L: Lanes, E: Element, const GROUP: usize>(
 ) -> Arrived {
     let shape = block.shape;
     let stride = shape.folding.stride;
-    let x = scaled_joint(shape, block.joint, block.scratch);
+    let Scratch { folded, scaled } = &mut *block.scratch;
+    let x = scaled_joint(shape, block.joint, scaled);
     let x = Rgb::new(x, x.len() / CHANNELS);
     let weight = &shape.folding.weight[..];
-    let mut found = Unfolded::new(l);
-    let a_tile = TILE * shape.joint_modes;
-    let mut sums = [[[[0.0f32; TILE]; CHANNELS]; 2]; MAX_CLASSES];
-    let mut tile = 0;
-    while tile * TILE < stride {
-        let pair = (tile + 1) * TILE < stride;
-        let mut at = tile * a_tile;
-        for (class, sums) in sums.iter_mut().take(GROUP).enumerate() {
-            *sums = [[[0.0; TILE]; CHANNELS]; 2];
-            let [first, second] = sums;
-            let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
-            let size = TILE * columns.indices().len();
-            let panel = &joint[at..at + size];
-            if pair {
-                let next = &joint[at + a_tile..at + a_tile + size];
-                let panels = [panel, next];
-                add_two_tiles(l, Term { panels, columns, x }, [first, second]);
+    let folded = &mut folded[..GROUP * CHANNELS * stride];
+    let mut start = 0;
+    for (class, folded) in folded.chunks_exact_mut(CHANNELS * stride).enumerate() {
+        let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
+        let size = TILE * columns.indices().len();
+        let (red, rest) = folded.split_at_mut(stride);
+        let (green, blue) = rest.split_at_mut(stride);
+        let mut at = 0;
+        while at < stride {
+            let here = &joint[start..start + size];
+            if at + TILE < stride {
+                let next = &joint[start + size..start + 2 * size];
+                let (r, g, b) = (&mut red[at..], &mut green[at..], &mut blue[at..]);
+                let (r0, r1) = r.split_at_mut(TILE);
+                let (g0, g1) = g.split_at_mut(TILE);
+                let (b0, b1) = b.split_at_mut(TILE);
+                let panels = [here, next];
+                let term = Term {
+                    panels,
+                    columns,
+                    x,
+                    scales: &[],
+                };
+                sum_two_tiles(l, term, [[r0, g0, b0], [r1, g1, b1]]);
+                at += 2 * TILE;
+                start += 2 * size;
             } else {
-                let panels = [panel];
-                add_tile(l, std::iter::once(Term { panels, columns, x }), first);
-            }
-            at += size;
-        }
-        for half in 0..1 + usize::from(pair) {
-            let mut classes = [&sums[0][half]; GROUP];
-            for (class, sums) in classes.iter_mut().zip(&sums) {
-                *class = &sums[half];
-            }
-            let (first, out) = ((tile + half) * TILE, &mut block.indirect);
-            if block.compare {
-                unfold::<L, GROUP, true>(l, classes, first, weight, out, &mut found);
-            } else {
-                unfold::<L, GROUP, false>(l, classes, first, weight, out, &mut found);
+                let panels = [here];
+                let term = Term {
+                    panels,
+                    columns,
+                    x,
+                    scales: &[],
+                };
+                let out = [&mut red[at..], &mut green[at..], &mut blue[at..]];
+                sum_tile(l, std::iter::once(term), out);
+                at += TILE;
+                start += size;
             }
         }
-        tile += 1 + usize::from(pair);
     }
-    let flux = [found.sum(l, 0), found.sum(l, 1), found.sum(l, 2)];
+    let mut found = Unfolded::new(l);
+    let mut flux = [0.0; CHANNELS];
+    for (channel, flux) in flux.iter_mut().enumerate() {
+        let (folded, apart) = (&folded[channel * stride..], CHANNELS * stride);
+        let out = &mut *block.indirect[channel];
+        *flux = if block.compare {
+            unfold::<L, GROUP, true>(l, folded, apart, weight, out, &mut found)
+        } else {
+            unfold::<L, GROUP, false>(l, folded, apart, weight, out, &mut found)
+        };
+    }
     let [change, peak] = if block.compare {
         found.change_and_peak(l)
     } else {
@@ -389,7 +393,7 @@ fn expand<L: Lanes, E: Element, const GROUP: usize>(
 pub(super) fn scaled_joint<'a>(
     shape: &PackedShape,
     joint: &'a [f32],
-    scratch: &'a mut Scratch,
+    scaled: &'a mut [f32],
 ) -> &'a [f32] {
     if shape.joint_scales.is_empty() {
         return joint;
@@ -398,10 +402,10 @@ pub(super) fn scaled_joint<'a>(
     for channel in 0..CHANNELS {
         for (mode, scale) in shape.joint_scales.iter().enumerate() {
             let at = channel * place + mode;
-            scratch.scaled[at] = joint[at] * scale;
+            scaled[at] = joint[at] * scale;
         }
     }
-    &scratch.scaled[..joint.len()]
+    &scaled[..joint.len()]
 }
 
 /// A tiled basis times joint coefficients: row after row, channel by channel.
@@ -449,16 +453,26 @@ fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
     while row < job.rows {
         let panel = |tile: usize| &values[tile * TILE * count..(tile + 1) * TILE * count];
         let mut sums = [[[0.0f32; TILE]; CHANNELS]; 2];
-        let [first, second] = &mut sums;
+        let [[r0, g0, b0], [r1, g1, b1]] = &mut sums;
         let pair = row + TILE < job.rows;
         let tile = row / TILE;
         let x = Rgb::new(x, x.len() / CHANNELS);
         if pair {
-            let panels = [panel(tile), panel(tile + 1)];
-            add_two_tiles(l, Term { panels, columns, x }, [first, second]);
+            let term = Term {
+                panels: [panel(tile), panel(tile + 1)],
+                columns,
+                x,
+                scales: &[],
+            };
+            sum_two_tiles(l, term, [[r0, g0, b0], [r1, g1, b1]]);
         } else {
-            let panels = [panel(tile)];
-            add_tile(l, std::iter::once(Term { panels, columns, x }), first);
+            let term = Term {
+                panels: [panel(tile)],
+                columns,
+                x,
+                scales: &[],
+            };
+            sum_tile(l, std::iter::once(term), [r0, g0, b0]);
         }
         for sums in sums.iter().take(1 + usize::from(pair)) {
             let height = TILE.min(job.rows - row);

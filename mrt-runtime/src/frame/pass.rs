@@ -215,6 +215,7 @@ impl Frame {
                     direct: direct.block(slots.clone()),
                     indirect: reflects_indirect.then(|| indirect.block(slots.clone())),
                     albedo: scene.surface.albedo.block(slots.clone()),
+                    uniform: scene.surface.uniform[place],
                     emission: emits.then(|| scene.surface.emission.block(slots.clone())),
                     scratch: part.scratch,
                     coefficients,
@@ -235,12 +236,11 @@ impl Frame {
         let (list, has_coefficients) = (&self.blocks.targets, &self.blocks.has_coefficients);
         let tasks = task_count(executor, list.len());
         let mut joint = Cut::new(&mut self.joint, size);
-        let mut scratch = self.scratch.iter_mut();
         let parts = (0..tasks).map_while(|k| {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            Some((list, joint.take(span(list)), scratch.next()?))
+            Some((list, joint.take(span(list))))
         });
-        run_parts(executor, parts, |(list, joint, scratch)| {
+        run_parts(executor, parts, |(list, joint): (&[u32], &mut [f32])| {
             let first = span(list).start;
             for &block in list {
                 let place = block as usize;
@@ -252,7 +252,6 @@ impl Frame {
                     coefficients,
                     has_coefficients,
                     gate_values,
-                    scratch,
                     joint: &mut joint[at * size..(at + 1) * size],
                 });
             }

@@ -20,7 +20,7 @@ pub struct PackedShape {
     /// `T_d->b`, in groups of rows of one class; each row has one number an orbit.
     pub(crate) rows: Values,
     pub(crate) groups: Vec<Group>,
-    /// The joint basis: tile after tile of orbits, in a tile class after class, in a class one column a mode.
+    /// The joint basis: class after class, in a class tile after tile of orbits, in a tile one column a mode.
     pub(crate) joint: Values,
     pub(crate) joint_columns: ColumnLists,
     /// By class: which of `joint_columns`.
@@ -35,6 +35,8 @@ pub struct PackedShape {
     /// By joint mode: a power of two near the size of its light. Responses are stored in such units, so that strong modes
     /// do not take all the digits.
     pub(crate) row_units: Vec<f32>,
+    /// One over the unit of each mode, in the order of rows.
+    pub(crate) row_inverses: Vec<f32>,
     /// Size of the light of each joint mode, and of the light that makes each coefficient.
     pub(crate) joint_norms: Vec<f32>,
     pub(crate) coefficient_norms: Vec<f32>,
@@ -160,8 +162,8 @@ impl PackedShape {
             })
             .collect();
         let mut joint = Values::new(storage);
-        for tile in (0..folding.stride).step_by(TILE) {
-            for class in 0..folding.elements() {
+        for class in 0..folding.elements() {
+            for tile in (0..folding.stride).step_by(TILE) {
                 for mode in of_class(class) {
                     let mode = usize::from(mode);
                     for orbit in tile..tile + TILE {
@@ -196,6 +198,10 @@ impl PackedShape {
             joint,
             joint_columns: lists,
             joint_classes,
+            row_inverses: row_order
+                .iter()
+                .map(|&mode| 1.0 / power_of_two(joint_norms[usize::from(mode)]))
+                .collect(),
             row_units: joint_norms.iter().map(|&n| power_of_two(n)).collect(),
             joint_norms,
             coefficient_norms: (0..t.rows())
