@@ -66,6 +66,10 @@ pub(crate) fn run_parts<T: Send>(
     f: impl Fn(T) + Sync,
 ) {
     let mut parts = parts.into_iter();
+    if executor.workers() <= 1 {
+        parts.for_each(f);
+        return;
+    }
     let mut slots: [Mutex<Option<T>>; MAX_TASKS] = std::array::from_fn(|_| Mutex::new(None));
     let mut count = 0;
     for (slot, part) in slots.iter_mut().zip(&mut parts) {

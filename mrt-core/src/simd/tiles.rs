@@ -206,6 +206,131 @@ pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [Ti
     }
 }
 
+/// A matrix of many tiles times three vectors: tile after tile, all with the same columns. `out` has as many numbers a
+/// channel as the matrix has rows.
+///
+/// # Panics
+/// If the rows are not whole tiles, there are not as many numbers as columns times rows, or `x` is shorter than any of
+/// the lists of columns allows.
+#[inline(always)]
+pub fn multiply_tiles<L: Lanes, E: Element>(
+    l: L,
+    tiles: &[E],
+    columns: Columns<'_>,
+    x: Rgb<'_>,
+    out: TileOut<'_>,
+) {
+    let size = TILE * columns.indices.len();
+    let rows = out[0].len();
+    assert!(rows.is_multiple_of(TILE) && tiles.len() == rows / TILE * size);
+    assert!(out.iter().all(|channel| channel.len() == rows));
+    assert!(x.has(columns.limit));
+    let [red, green, blue] = out;
+    let mut row = 0;
+    while row < rows {
+        // SAFETY: row + TILE <= rows, the length of each channel, so the panel ends within the tiles. Where there is
+        // room for a second tile, that holds for it too.
+        unsafe {
+            let panel = |row: usize| {
+                let start = row / TILE * size;
+                tiles.get_unchecked(start..start + size)
+            };
+            let end = row + 2 * TILE;
+            if (L::N == 8 || L::N == 16) && end <= rows {
+                let panels = [panel(row), panel(row + TILE)];
+                let (r0, r1) = red.get_unchecked_mut(row..end).split_at_mut_unchecked(TILE);
+                let (g0, g1) = green
+                    .get_unchecked_mut(row..end)
+                    .split_at_mut_unchecked(TILE);
+                let (b0, b1) = blue
+                    .get_unchecked_mut(row..end)
+                    .split_at_mut_unchecked(TILE);
+                let out = [[r0, g0, b0], [r1, g1, b1]];
+                if L::N == 8 {
+                    multiply_panels::<L, E, 2, 2, 1>(l, panels, columns, x, out);
+                } else {
+                    multiply_panels::<L, E, 2, 1, 2>(l, panels, columns, x, out);
+                }
+                row = end;
+                continue;
+            }
+            let end = row + TILE;
+            let out = [
+                red.get_unchecked_mut(row..end),
+                green.get_unchecked_mut(row..end),
+                blue.get_unchecked_mut(row..end),
+            ];
+            match L::N {
+                4 => multiply_panels::<L, E, 1, 4, 1>(l, [panel(row)], columns, x, [out]),
+                8 => multiply_panels::<L, E, 1, 2, 2>(l, [panel(row)], columns, x, [out]),
+                16 => multiply_panels::<L, E, 1, 1, 4>(l, [panel(row)], columns, x, [out]),
+                _ => {
+                    let term = Term {
+                        panels: [panel(row)],
+                        columns,
+                        x,
+                        scales: &[],
+                    };
+                    sum_rows_one_by_one::<L, E, TILE>(l, std::iter::once(term), out);
+                }
+            }
+            row = end;
+        }
+    }
+}
+
+/// One tile of each panel.
+///
+/// # Safety
+/// Each panel has a tile of numbers for each column, `x` three numbers for each, `out` a tile a channel and panel, and
+/// `VECTORS` vectors make a tile.
+#[inline(always)]
+unsafe fn multiply_panels<
+    L: Lanes,
+    E: Element,
+    const PANELS: usize,
+    const VECTORS: usize,
+    const SETS: usize,
+>(
+    l: L,
+    panels: [&[E]; PANELS],
+    columns: Columns<'_>,
+    x: Rgb<'_>,
+    out: [TileOut<'_>; PANELS],
+) {
+    let count = columns.indices.len();
+    let mut acc = [[[[l.splat(0.0); VECTORS]; CHANNELS]; PANELS]; SETS];
+    let mut k = 0;
+    while k + SETS <= count {
+        for (set, acc) in acc.iter_mut().enumerate() {
+            // SAFETY: k + set < count, and the caller's promises.
+            unsafe {
+                add_column::<L, E, PANELS, VECTORS, TILE>(l, panels, columns, k + set, x, 1.0, acc);
+            }
+        }
+        k += SETS;
+    }
+    while k < count {
+        // SAFETY: as above.
+        unsafe {
+            add_column::<L, E, PANELS, VECTORS, TILE>(l, panels, columns, k, x, 1.0, &mut acc[0]);
+        }
+        k += 1;
+    }
+    for (panel, out) in out.into_iter().enumerate() {
+        for (channel, out) in out.into_iter().enumerate() {
+            for v in 0..VECTORS {
+                let mut sum = acc[0][panel][channel][v];
+                for other in &acc[1..] {
+                    sum = l.add(sum, other[panel][channel][v]);
+                }
+                // SAFETY: the caller's promises.
+                unsafe { l.store_unchecked(out, v * L::N, sum) };
+            }
+        }
+    }
+}
+
 /// [`sum_tile`] for a tile of [`HALF_TILE`] rows.
 ///
 /// # Panics
@@ -410,47 +535,90 @@ fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
     }
 }
 
-/// Rows of a group in [`dot_rows`].
+/// Rows of a group in [`dot_rows`], at most.
 pub const DOT_ROWS: usize = 4;
 
-/// Sums of [`DOT_ROWS`] rows of numbers times three vectors: `out[row][channel]`.
+/// Sums of up to [`DOT_ROWS`] rows of numbers times three vectors: `out[row][channel]`.
 ///
 /// `rows` holds row after row, each as long as a vector; lengths are multiples of [`WIDEST`](super::WIDEST).
 ///
 /// # Panics
-/// If `rows` is not [`DOT_ROWS`] times as long as a vector, or that length is no multiple of the lanes.
+/// If `rows` is not 1 to [`DOT_ROWS`] times as long as a vector, or that length is no multiple of the lanes.
 #[inline(always)]
 pub fn dot_rows<L: Lanes, E: Element>(
     l: L,
     rows: &[E],
     x: [&[f32]; CHANNELS],
 ) -> [[f32; CHANNELS]; DOT_ROWS] {
+    match rows.len() / x[0].len().max(1) {
+        1 => dot_some_rows::<L, E, 1, 4>(l, rows, x),
+        2 => dot_some_rows::<L, E, 2, 2>(l, rows, x),
+        3 => dot_some_rows::<L, E, 3, 1>(l, rows, x),
+        _ => dot_some_rows::<L, E, 4, 1>(l, rows, x),
+    }
+}
+
+/// `SETS` vectors of each row go to sums of their own, so that enough products are under way at once.
+#[inline(always)]
+fn dot_some_rows<L: Lanes, E: Element, const ROWS: usize, const SETS: usize>(
+    l: L,
+    rows: &[E],
+    x: [&[f32]; CHANNELS],
+) -> [[f32; CHANNELS]; DOT_ROWS] {
     let length = x[0].len();
     assert!(x.iter().all(|x| x.len() == length) && length.is_multiple_of(L::N));
-    assert_eq!(rows.len(), DOT_ROWS * length, "rows");
-    let mut acc = [[l.splat(0.0); CHANNELS]; DOT_ROWS];
+    assert_eq!(rows.len(), ROWS * length, "rows");
+    let mut acc = [[[l.splat(0.0); CHANNELS]; ROWS]; SETS];
+    let step = SETS * L::N;
     let mut at = 0;
+    while at + step <= length {
+        for (set, acc) in acc.iter_mut().enumerate() {
+            // SAFETY: at + step <= length.
+            unsafe { dot_vector(l, rows, x, length, at + set * L::N, acc) };
+        }
+        at += step;
+    }
     while at < length {
-        let mut signal = [l.splat(0.0); CHANNELS];
-        for (signal, x) in signal.iter_mut().zip(x) {
-            // SAFETY: at + N <= length, since the length is a multiple of N.
-            *signal = l.load(unsafe { x.get_unchecked(at..at + L::N) });
-        }
-        for (row, acc) in acc.iter_mut().enumerate() {
-            // SAFETY: as above, in the row that starts at row * length.
-            let a = unsafe { rows.get_unchecked(row * length + at..row * length + at + L::N) };
-            let a = E::load(l, a);
-            for (acc, &signal) in acc.iter_mut().zip(&signal) {
-                *acc = l.mul_add(a, signal, *acc);
-            }
-        }
+        // SAFETY: at + N <= length, since the length is a multiple of N.
+        unsafe { dot_vector(l, rows, x, length, at, &mut acc[0]) };
         at += L::N;
     }
     let mut sums = [[0.0; CHANNELS]; DOT_ROWS];
-    for (sums, acc) in sums.iter_mut().zip(&acc) {
-        for (sum, &acc) in sums.iter_mut().zip(acc) {
-            *sum = l.sum(acc);
+    for (row, sums) in sums.iter_mut().take(ROWS).enumerate() {
+        for (channel, sum) in sums.iter_mut().enumerate() {
+            let mut all = acc[0][row][channel];
+            for other in &acc[1..] {
+                all = l.add(all, other[row][channel]);
+            }
+            *sum = l.sum(all);
         }
     }
     sums
+}
+
+/// `acc += rows[at..] * x[at..]`, one vector of each row.
+///
+/// # Safety
+/// Each vector of `x` has `length` numbers, `rows` that many for each row, and `at + N <= length`.
+#[inline(always)]
+unsafe fn dot_vector<L: Lanes, E: Element, const ROWS: usize>(
+    l: L,
+    rows: &[E],
+    x: [&[f32]; CHANNELS],
+    length: usize,
+    at: usize,
+    acc: &mut [[L::V; CHANNELS]; ROWS],
+) {
+    let mut signal = [l.splat(0.0); CHANNELS];
+    for (signal, x) in signal.iter_mut().zip(x) {
+        // SAFETY: the caller's promises; so below.
+        *signal = unsafe { l.load_unchecked(x, at) };
+    }
+    for (row, acc) in acc.iter_mut().enumerate() {
+        let start = row * length + at;
+        let a = E::load(l, unsafe { rows.get_unchecked(start..start + L::N) });
+        for (acc, &signal) in acc.iter_mut().zip(&signal) {
+            *acc = l.mul_add(a, signal, *acc);
+        }
+    }
 }

@@ -10,6 +10,8 @@ pub(super) struct Blocks {
     pub state: Vec<BlockState>,
     /// Whether a block's coefficients b are not all zero.
     pub has_coefficients: Vec<bool>,
+    /// Number of those that light was sent out from.
+    pub lit: usize,
     /// Blocks with light of any kind, ascending.
     pub alive: Vec<u32>,
     /// Blocks whose coefficients b are to be computed in this pass, ascending.
@@ -58,6 +60,7 @@ impl Blocks {
         Self {
             state: vec![BlockState::default(); count],
             has_coefficients: vec![false; count],
+            lit: 0,
             alive: Vec::with_capacity(count),
             sources: Vec::with_capacity(count),
             targets: Vec::with_capacity(count),
@@ -74,6 +77,7 @@ impl Blocks {
     pub(super) fn restart(&mut self, emitting: &[u32]) {
         self.state.fill(BlockState::default());
         self.has_coefficients.fill(false);
+        self.lit = 0;
         self.alive.clear();
         self.waiting.clear();
         self.changed.clear();

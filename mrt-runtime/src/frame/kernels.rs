@@ -4,7 +4,8 @@ use crate::packed::{PackedShape, PackedTransport, TransportEntry, Values};
 use glam::Vec3;
 use mrt_core::simd::folded::{Albedo, Reflected, Unfolded, fold, unfold};
 use mrt_core::simd::tiles::{
-    CHANNELS, DOT_ROWS, Element, Rgb, TILE, Term, dot_rows, sum_half_tile, sum_tile, sum_two_tiles,
+    CHANNELS, Element, Rgb, TILE, Term, dot_rows, multiply_tiles, sum_half_tile, sum_tile,
+    sum_two_tiles,
 };
 use mrt_core::simd::{Kernel, Lanes, WIDEST};
 use std::ops::Range;
@@ -100,8 +101,10 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
 fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
     let stride = block.shape.folding.stride;
     let place = block.coefficients.len() / CHANNELS;
-    for (k, group) in block.shape.groups.iter().enumerate() {
-        let rows = &rows[k * DOT_ROWS * stride..(k + 1) * DOT_ROWS * stride];
+    let mut start = 0;
+    for group in &block.shape.groups {
+        let end = start + usize::from(group.count) * stride;
+        let rows = &rows[std::mem::replace(&mut start, end)..end];
         let class = usize::from(group.class) * CHANNELS * stride;
         let folded = &block.scratch.folded[class..class + CHANNELS * stride];
         let x = [
@@ -129,6 +132,8 @@ pub(super) struct ResponsesOf<'a> {
     pub coefficients: &'a [f32],
     /// Whether a block has any.
     pub has_coefficients: &'a [bool],
+    /// Whether all blocks have.
+    pub all_lit: bool,
     pub gate_values: &'a [f32],
     /// Joint coefficients of this block.
     pub joint: &'a mut [f32],
@@ -231,6 +236,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
         let runs = LitRuns {
             entries: &entries[gated..],
             has_coefficients: block.has_coefficients,
+            all_lit: block.all_lit,
         };
         let x = Rgb::new(block.coefficients, mode_stride);
         let lit = runs.map(|(columns, start)| Term {
@@ -275,6 +281,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
 struct LitRuns<'a> {
     entries: &'a [TransportEntry],
     has_coefficients: &'a [bool],
+    all_lit: bool,
 }
 
 impl Iterator for LitRuns<'_> {
@@ -283,16 +290,25 @@ impl Iterator for LitRuns<'_> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
+        if self.all_lit {
+            return run_of(std::mem::take(&mut self.entries));
+        }
         let is_lit = |entry: &TransportEntry| self.has_coefficients[entry.source as usize];
         let dark = self.entries.iter().take_while(|entry| !is_lit(entry));
         let rest = &self.entries[dark.count()..];
         let lit = rest.iter().take_while(|entry| is_lit(entry)).count();
         let (run, rest) = rest.split_at(lit);
         self.entries = rest;
-        let (first, last) = (run.first()?, run.last()?);
-        let columns = first.columns.start as usize..last.columns.end as usize;
-        Some((columns, first.start as usize))
+        run_of(run)
     }
+}
+
+/// Columns of entries that stand side by side, and their first number.
+#[inline(always)]
+fn run_of(entries: &[TransportEntry]) -> Option<(Range<usize>, usize)> {
+    let (first, last) = (entries.first()?, entries.last()?);
+    let columns = first.columns.start as usize..last.columns.end as usize;
+    Some((columns, first.start as usize))
 }
 
 #[inline(always)]
@@ -327,42 +343,12 @@ fn expand<L: Lanes, E: Element, const GROUP: usize>(
     let mut start = 0;
     for (class, folded) in folded.chunks_exact_mut(CHANNELS * stride).enumerate() {
         let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
-        let size = TILE * columns.indices().len();
         let (red, rest) = folded.split_at_mut(stride);
         let (green, blue) = rest.split_at_mut(stride);
-        let mut at = 0;
-        while at < stride {
-            let here = &joint[start..start + size];
-            if at + TILE < stride {
-                let next = &joint[start + size..start + 2 * size];
-                let (r, g, b) = (&mut red[at..], &mut green[at..], &mut blue[at..]);
-                let (r0, r1) = r.split_at_mut(TILE);
-                let (g0, g1) = g.split_at_mut(TILE);
-                let (b0, b1) = b.split_at_mut(TILE);
-                let panels = [here, next];
-                let term = Term {
-                    panels,
-                    columns,
-                    x,
-                    scales: &[],
-                };
-                sum_two_tiles(l, term, [[r0, g0, b0], [r1, g1, b1]]);
-                at += 2 * TILE;
-                start += 2 * size;
-            } else {
-                let panels = [here];
-                let term = Term {
-                    panels,
-                    columns,
-                    x,
-                    scales: &[],
-                };
-                let out = [&mut red[at..], &mut green[at..], &mut blue[at..]];
-                sum_tile(l, std::iter::once(term), out);
-                at += TILE;
-                start += size;
-            }
-        }
+        let size = stride * columns.indices().len();
+        let end = start + size;
+        let tiles = &joint[std::mem::replace(&mut start, end)..end];
+        multiply_tiles(l, tiles, columns, x, [red, green, blue]);
     }
     let mut found = Unfolded::new(l);
     let mut flux = [0.0; CHANNELS];

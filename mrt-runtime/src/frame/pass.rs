@@ -61,11 +61,12 @@ impl Frame {
         self.joint.fill(0.0);
         self.indirect.clear();
         self.blocks.has_coefficients.fill(false);
+        self.blocks.lit = 0;
         for k in 0..self.blocks.alive.len() {
             let block = self.blocks.alive[k];
             self.blocks.mark_changed(block);
             let state = &mut self.blocks.state[block as usize];
-            state.has_indirect = false;
+            (state.has_indirect, state.had_coefficients) = (false, false);
             (state.arrived, state.peak) = ([0.0; 3], 0.0);
         }
     }
@@ -109,6 +110,8 @@ impl Frame {
                 &mut state.had_coefficients,
                 blocks.has_coefficients[block as usize],
             );
+            blocks.lit += usize::from(state.had_coefficients);
+            blocks.lit -= usize::from(had);
             if all || had || state.had_coefficients {
                 blocks.await_light(block);
                 for &reached in scene.transport.reached(block as usize) {
@@ -234,6 +237,7 @@ impl Frame {
         let (coefficients, gate_values) = (&self.coefficients, &self.gate_values);
         let size = 3 * layout.joint_stride;
         let (list, has_coefficients) = (&self.blocks.targets, &self.blocks.has_coefficients);
+        let all_lit = self.blocks.lit == has_coefficients.len();
         let tasks = task_count(executor, list.len());
         let mut joint = Cut::new(&mut self.joint, size);
         let parts = (0..tasks).map_while(|k| {
@@ -251,6 +255,7 @@ impl Frame {
                     transport: &scene.transport,
                     coefficients,
                     has_coefficients,
+                    all_lit,
                     gate_values,
                     joint: &mut joint[at * size..(at + 1) * size],
                 });

@@ -284,25 +284,27 @@ fn coefficient_rows(
         let modes: Vec<usize> = (0..t.rows())
             .filter(|&mode| usize::from(classes.coefficients[mode]) == class)
             .collect();
-        for members in modes.chunks(DOT_ROWS) {
+        // Groups of nearly equal size: five rows are three and two.
+        let count = modes.len().div_ceil(DOT_ROWS);
+        let part = |k: usize| &modes[k * modes.len() / count..(k + 1) * modes.len() / count];
+        for members in (0..count).map(part) {
             let mut group = Group {
                 class: class as u8,
                 count: members.len() as u8,
                 modes: [0; DOT_ROWS],
                 scales: [1.0; DOT_ROWS],
             };
-            for k in 0..DOT_ROWS {
-                let mode = members.get(k).copied();
+            for (k, &mode) in members.iter().enumerate() {
                 let value = |orbit: usize| {
                     let texel = folding.first(orbit)?;
-                    Some(t[(mode?, texel)] * folding.multiplicity[orbit])
+                    Some(t[(mode, texel)] * folding.multiplicity[orbit])
                 };
                 let orbits = 0..folding.stride;
                 let largest = orbits
                     .clone()
                     .filter_map(value)
                     .fold(0.0f32, |m, x| m.max(x.abs()));
-                group.modes[k] = mode.unwrap_or(0) as u16;
+                group.modes[k] = mode as u16;
                 group.scales[k] = Values::scale(storage, largest);
                 for orbit in orbits {
                     rows.push(value(orbit).unwrap_or(0.0), group.scales[k]);
