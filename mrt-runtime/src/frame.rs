@@ -67,6 +67,17 @@ pub struct StageTimes {
     pub vector: Duration,
 }
 
+/// Blocks that the last frame worked on, each once a pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameWork {
+    /// Blocks whose direct light was computed.
+    pub direct: usize,
+    /// Blocks whose coefficients b were computed.
+    pub sources: usize,
+    /// Blocks whose indirect light was computed.
+    pub targets: usize,
+}
+
 /// What a frame computes besides irradiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outputs {
@@ -134,7 +145,8 @@ impl StageTimes {
     }
 }
 
-/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`] does aside).
+/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`] does aside, and
+/// the first frame of another scene with probes).
 ///
 /// [`Frame::direct`], [`Frame::indirect`] and [`Frame::coefficients`] give signals block by block in the level's order, in
 /// a block channel by channel (red, green, blue), and in a channel texel by texel in the canonical shape's order. They
@@ -159,6 +171,7 @@ pub struct Frame {
     probes: Option<Probes>,
     vector: Vec<f32>,
     times: StageTimes,
+    work: FrameWork,
     passes: u32,
 }
 
@@ -262,6 +275,7 @@ impl Frame {
                 Vec::new()
             },
             times: StageTimes::default(),
+            work: FrameWork::default(),
             passes: 0,
             config,
         }
@@ -315,6 +329,10 @@ impl Frame {
         }
         let start = Instant::now();
         self.begin(scene);
+        self.work = FrameWork {
+            direct: scene.blocks.len(),
+            ..FrameWork::default()
+        };
         self.take_direct(scene, direct);
         self.times = StageTimes {
             direct: start.elapsed(),
@@ -338,6 +356,7 @@ impl Frame {
             return;
         }
         self.revision = scene.surface.revision;
+        let same_blocks = Arc::ptr_eq(&self.layout, &scene.layout);
         self.layout = scene.layout.clone();
         self.direct.clear();
         self.indirect.clear();
@@ -345,8 +364,11 @@ impl Frame {
         self.joint.fill(0.0);
         self.lightmap.fill([0.0; 3]);
         self.vector.fill(0.0);
-        if let Some(probes) = &mut self.probes {
-            probes.restart(scene);
+        match &mut self.probes {
+            Some(probes) if same_blocks => probes.darken(),
+            // This allocates; surfaces that change do not come here.
+            Some(probes) => probes.restart(scene),
+            None => {}
         }
         self.lights.restart(scene);
         self.blocks.restart(&scene.surface.emitting);
@@ -405,6 +427,8 @@ impl Frame {
     fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
         // Doors and shapes may differ where the number of texels does not.
         let pixels = scene.atlas.width * scene.atlas.height;
+        let slots = scene.shapes.iter().map(|shape| shape.folding.slots());
+        let (largest_block, largest_room) = (slots.max().unwrap_or(0), self.lights.slots());
         for (what, expected, found) in [
             ("texels", self.layout.texel_count(), scene.texel_count()),
             ("blocks", self.layout.block_count(), scene.blocks.len()),
@@ -412,6 +436,11 @@ impl Frame {
                 "texel slots",
                 self.direct.slots(),
                 scene.layout.slot_count(),
+            ),
+            (
+                "texel slots in a block",
+                largest_room,
+                largest_block.max(largest_room),
             ),
             (
                 "coefficients",
@@ -575,6 +604,11 @@ impl Frame {
     /// Time that each stage took, summed over the passes.
     pub fn times(&self) -> StageTimes {
         self.times
+    }
+
+    /// Blocks that the last frame worked on.
+    pub fn work(&self) -> FrameWork {
+        self.work
     }
 
     /// Passes of the last frame.

@@ -20,6 +20,8 @@ pub(super) fn limit_flux(
     joint: &mut [f32],
 ) {
     let layout = &scene.layout;
+    // Sums in one order, whichever blocks came to have light first.
+    blocks.alive.sort_unstable();
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0, 0.0);
         for &block in &blocks.alive {
