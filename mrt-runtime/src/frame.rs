@@ -76,6 +76,8 @@ pub struct FrameWork {
     pub sources: usize,
     /// Blocks whose indirect light was computed.
     pub targets: usize,
+    /// Channels that were scaled down, as more light arrived in them than left: then the next frame computes all anew.
+    pub limited: usize,
 }
 
 /// What a frame computes besides irradiance.
@@ -110,10 +112,13 @@ pub struct FrameConfig {
     /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, with
     /// [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. Of a texel of albedo a, the light that it reflects is then off by
     /// at most a times this at each bounce, so by `tolerance a / (1 - a)` over all. At 0, the default, what is kept is kept
-    /// because nothing about it changed, bit by bit.
+    /// because nothing about it changed, bit by bit; with feedback, rounding then changes the last bits for ever, and
+    /// some 1e-6 of the brightest irradiance lets static light come to rest.
     pub tolerance: f32,
     /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
-    /// last of them waits for n / `slice` frames, rounded up: oldest first. `None`, the default: all.
+    /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long
+    /// again. Light that moves is there twice meanwhile, and where that is more than leaves the walls, all indirect light
+    /// is scaled down until the last block had its turn. `None`, the default: all.
     pub slice: Option<NonZero<usize>>,
     /// Who does the work.
     pub executor: Arc<dyn Executor>,

@@ -40,10 +40,15 @@ fn solve(frame: &mut Frame, scene: &Scene, lights: &[Light], bounces: Bounces) {
 
 /// Moving lamps of about a watt, so that no channel needs to be scaled down.
 fn lamp(random: &mut Random, level: &Level) -> Light {
-    sphere(random_position(random, level), 0.3, Vec3::new(1.0, 0.5, 0.25))
+    sphere(
+        random_position(random, level),
+        0.3,
+        Vec3::new(1.0, 0.5, 0.25),
+    )
 }
 
-/// One bounce: once lights stand still, direct light and then indirect light wait for `blocks / slice` frames each.
+/// One bounce: once lights stand still, direct light waits for `blocks / slice` frames, and indirect light as long again.
+/// Where what was there before was more light than now, it was scaled down meanwhile, and a third round sets that right.
 #[test]
 fn slices_show_the_same_light_in_the_end() {
     for seed in 0..20 {
@@ -63,17 +68,25 @@ fn slices_show_the_same_light_in_the_end() {
             solve(&mut expected, &scene, &lights, Bounces::Count(1));
             let mut needed = 0;
             let mut frames = 0;
-            while frames < 2 * blocks.div_ceil(slice) {
+            let mut limited = 0;
+            while frames < 3 * blocks.div_ceil(slice) {
                 solve(&mut frame, &scene, &lights, Bounces::Count(1));
                 assert!(frame.work().targets <= slice && frame.work().direct <= slice);
                 frames += 1;
+                limited += usize::from(frame.work().limited > 0);
                 if difference(&frame, &expected).is_some() {
                     needed = frames + 1;
                 }
             }
             let apart = difference(&frame, &expected);
-            assert_eq!(apart, None, "seed {seed}, {blocks} blocks, slices of {slice}");
-            println!("{blocks} blocks, slices of {slice}: {needed} frames of {frames}");
+            println!("{blocks} blocks, slices of {slice}: {needed} frames, {limited} scaled");
+            assert_eq!(
+                apart, None,
+                "seed {seed}, {blocks} blocks, slices of {slice}"
+            );
+            if limited == 0 {
+                assert!(needed <= 2 * blocks.div_ceil(slice) + 1);
+            }
         }
     }
 }
@@ -118,10 +131,37 @@ fn no_block_waits_longer_than_stated() {
     }
 }
 
-/// Feedback in slices comes to the same light. Measured TODO.
+/// A lamp that moves changes nothing at the other end of a long corridor, where another stands still.
+#[test]
+#[ignore = "in slices, limit_flux compares what leaves now with what arrived before, and dims what stands still"]
+fn in_slices_light_that_stands_still_is_not_dimmed() {
+    let cells: Vec<[i32; 2]> = common::corridor(30);
+    let scene = mobile(&floor_plan(&cells, 0.5));
+    let lamp = |x: f32| sphere(Vec3::new(x, 0.5, 0.5), 0.3, Vec3::ONE);
+    let mut frame = sliced(&scene, 4);
+    let of_first = 0..3 * scene.blocks[0].texels.end;
+    let mut still = None;
+    for step in 0..60 {
+        let x = if step < 30 { 20.5 } else { 26.5 };
+        solve(&mut frame, &scene, &[lamp(0.5), lamp(x)], Bounces::Count(1));
+        let now = frame.indirect()[of_first.clone()].to_vec();
+        if step == 29 {
+            still = Some(now);
+        } else if let Some(still) = &still {
+            assert!(
+                now == *still,
+                "frame {step}: {} of {}",
+                now[100],
+                still[100]
+            );
+        }
+    }
+}
+
+/// Feedback in slices comes to the same light, but for rounding, which keeps both in motion. Measured: 7e-8 apart.
 #[test]
 fn feedback_in_slices_converges_to_the_same_light() {
-    const BOUND: f64 = 1e-5;
+    const BOUND: f64 = 1e-6;
     for (blocks, slice) in [(9, 1), (25, 4), (25, 24)] {
         let level = maze(blocks, Vec3::splat(0.6), 11);
         let scene = mobile(&level);
@@ -132,21 +172,16 @@ fn feedback_in_slices_converges_to_the_same_light() {
             solve(&mut expected, &scene, &lights, Bounces::Feedback);
         }
         let mut frame = sliced(&scene, slice);
-        let mut last = 0;
-        for k in 0..limit * blocks.div_ceil(slice) {
+        for _ in 0..limit * blocks.div_ceil(slice) {
             solve(&mut frame, &scene, &lights, Bounces::Feedback);
             assert!(frame.work().targets <= slice);
-            if frame.work().targets > 0 {
-                last = k;
-            }
         }
         let apart = largest_difference(
             &by_texel(&scene, &frame.indirect()),
             &by_texel(&scene, &expected.indirect()),
         );
-        println!("{blocks} blocks, slices of {slice}: {apart:.1e} apart, still from frame {last}");
+        println!("{blocks} blocks, slices of {slice}: {apart:.1e} apart");
         assert!(apart < BOUND, "{apart}");
-        assert_eq!(expected.work().targets, 0, "nothing changes any more");
     }
 }
 
@@ -169,8 +204,8 @@ impl Executor for Backwards {
         std::thread::scope(|scope| {
             for _ in 0..self.0 {
                 scope.spawn(|| {
-                    while let Ok(k) =
-                        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |k| k.checked_sub(1))
+                    while let Ok(k) = left
+                        .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |k| k.checked_sub(1))
                     {
                         task(k - 1);
                     }
@@ -263,8 +298,8 @@ fn an_executor_that_grows_loses_no_block() {
     }
 }
 
-/// Sums over sources come in another order: a few roundings of `f32`. Measured TODO.
-const REORDERED: f64 = 1e-5;
+/// Sums over sources come in another order: a few roundings of `f32`. Measured: 2e-7, over twenty bounces.
+const REORDERED: f64 = 2e-6;
 
 /// The level with its blocks in another order: block k of the result is block `order[k]`.
 fn reordered(level: &Level, order: &[usize]) -> Level {

@@ -156,7 +156,8 @@ impl Frame {
             blocks.touch(block, resent);
             blocks.mark_changed(block);
         }
-        limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
+        self.work.limited +=
+            limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
         let peaks = self.blocks.alive.iter();
         let peak = peaks.fold(0.0f32, |m, &block| {
             m.max(self.blocks.state[block as usize].peak)
@@ -185,7 +186,10 @@ impl Frame {
             has_coefficients,
             ..
         } = &mut self.blocks;
-        let (list, tasks) = (&*sources, task_count(executor, sources.len()).min(self.scratch.len()));
+        let (list, tasks) = (
+            &*sources,
+            task_count(executor, sources.len()).min(self.scratch.len()),
+        );
         let mut coefficients = Cut::new(&mut self.coefficients, size);
         let mut flags = Cut::new(has_coefficients, 1);
         let mut state = Cut::new(state, 1);
@@ -276,7 +280,10 @@ impl Frame {
         // After one bounce nobody asks what changed.
         let compare = self.blocks.kept != Kept::Once;
         let Blocks { targets, state, .. } = &mut self.blocks;
-        let (list, tasks) = (&*targets, task_count(executor, targets.len()).min(self.scratch.len()));
+        let (list, tasks) = (
+            &*targets,
+            task_count(executor, targets.len()).min(self.scratch.len()),
+        );
         let mut state = Cut::new(state, 1);
         let mut planes = CutPlanes::new(&mut self.indirect);
         let mut scratch = self.scratch.iter_mut();

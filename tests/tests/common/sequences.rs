@@ -6,6 +6,10 @@
 use crate::common::{Random, random_cells};
 use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
+use mrt_core::storage::Storage;
+use mrt_dictionary::bake::bake;
+use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::progress::Progress;
 use mrt_runtime::assemble::{AssembleConfig, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::Frame;
@@ -27,6 +31,38 @@ pub fn mobile_dictionary() -> &'static Dictionary {
 /// The level with the mobile dictionary.
 pub fn mobile(level: &Level) -> Scene {
     assemble(level, mobile_dictionary(), &AssembleConfig::default()).expect("the level fits")
+}
+
+/// A dictionary with vector irradiance, as small as they come.
+pub fn vector_dictionary() -> &'static Dictionary {
+    static DICTIONARY: OnceLock<Dictionary> = OnceLock::new();
+    DICTIONARY.get_or_init(|| {
+        let mut config = BakeConfig::preset("mobile").expect("a preset");
+        config.resolution = 4;
+        config.modes = 8;
+        config.coupling.emission_modes = 8;
+        config.coupling.response_modes = 8;
+        config.coupling.foreign_modes = 8;
+        config.coupling.depth = 2;
+        config.outputs.vector = true;
+        config.lightfield.positions = 4;
+        config.lightfield.directions = 4;
+        config.lightfield.lightfield_modes = 16;
+        bake(&config, &Progress::silent()).expect("nobody cancels")
+    })
+}
+
+/// How operators can be kept.
+pub const STORAGES: [Storage; 3] = [Storage::F32, Storage::F16, Storage::Int8];
+
+/// The level with all operators kept in one way.
+pub fn stored(level: &Level, dictionary: &Dictionary, storage: Storage) -> Scene {
+    let config = AssembleConfig {
+        shape_storage: storage,
+        transport_storage: storage,
+        ..AssembleConfig::default()
+    };
+    assemble(level, dictionary, &config).expect("the level fits")
 }
 
 /// Seldom dark, often bright, up to 0.99.
@@ -76,7 +112,11 @@ pub fn furnish(random: &mut Random, level: &mut Level) {
 /// A gentle bend of the plan: walls stay upright, floors and ceilings flat.
 fn bent(point: DVec3) -> DVec3 {
     let DVec3 { x, y, z } = point;
-    DVec3::new(x + 0.12 * (0.9 * z).sin(), 0.8 * y, z + 0.1 * (0.7 * x).sin())
+    DVec3::new(
+        x + 0.12 * (0.9 * z).sin(),
+        0.8 * y,
+        z + 0.1 * (0.7 * x).sin(),
+    )
 }
 
 /// A point of a random block, often next to a wall, sometimes on one.
@@ -130,7 +170,12 @@ pub fn random_light(random: &mut Random, level: &Level) -> Light {
 }
 
 /// Lights of a level that fit its scene: positions are rounded, and one on a wall of a bent block may be outside.
-pub fn random_lights(random: &mut Random, level: &Level, scene: &Scene, count: usize) -> Vec<Light> {
+pub fn random_lights(
+    random: &mut Random,
+    level: &Level,
+    scene: &Scene,
+    count: usize,
+) -> Vec<Light> {
     let lights = (0..count).map(|_| random_light(random, level));
     let lights: Vec<Light> = lights.collect();
     let fits = |light: &Light| mrt_runtime::light::place(scene, 0, *light).is_ok();
