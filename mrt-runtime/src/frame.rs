@@ -67,6 +67,19 @@ pub struct StageTimes {
     pub vector: Duration,
 }
 
+/// Blocks that the last frame worked on, each once a pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameWork {
+    /// Blocks whose direct light was computed.
+    pub direct: usize,
+    /// Blocks whose coefficients b were computed.
+    pub sources: usize,
+    /// Blocks whose indirect light was computed.
+    pub targets: usize,
+    /// Channels that were scaled down, as more light arrived in them than left: then the next frame computes all anew.
+    pub limited: usize,
+}
+
 /// What a frame computes besides irradiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outputs {
@@ -99,10 +112,13 @@ pub struct FrameConfig {
     /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, with
     /// [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. Of a texel of albedo a, the light that it reflects is then off by
     /// at most a times this at each bounce, so by `tolerance a / (1 - a)` over all. At 0, the default, what is kept is kept
-    /// because nothing about it changed, bit by bit.
+    /// because nothing about it changed, bit by bit; with feedback, rounding then changes the last bits for ever, and
+    /// some 1e-6 of the brightest irradiance lets static light come to rest.
     pub tolerance: f32,
     /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
-    /// last of them waits for n / `slice` frames, rounded up: oldest first. `None`, the default: all.
+    /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long
+    /// again. Light that moves is there twice meanwhile, and where that is more than leaves the walls, all indirect light
+    /// is scaled down until the last block had its turn. `None`, the default: all.
     pub slice: Option<NonZero<usize>>,
     /// Who does the work.
     pub executor: Arc<dyn Executor>,
@@ -134,7 +150,8 @@ impl StageTimes {
     }
 }
 
-/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`] does aside).
+/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`] does aside, and
+/// the first frame of another scene with probes).
 ///
 /// [`Frame::direct`], [`Frame::indirect`] and [`Frame::coefficients`] give signals block by block in the level's order, in
 /// a block channel by channel (red, green, blue), and in a channel texel by texel in the canonical shape's order. They
@@ -159,6 +176,7 @@ pub struct Frame {
     probes: Option<Probes>,
     vector: Vec<f32>,
     times: StageTimes,
+    work: FrameWork,
     passes: u32,
 }
 
@@ -262,6 +280,7 @@ impl Frame {
                 Vec::new()
             },
             times: StageTimes::default(),
+            work: FrameWork::default(),
             passes: 0,
             config,
         }
@@ -315,6 +334,10 @@ impl Frame {
         }
         let start = Instant::now();
         self.begin(scene);
+        self.work = FrameWork {
+            direct: scene.blocks.len(),
+            ..FrameWork::default()
+        };
         self.take_direct(scene, direct);
         self.times = StageTimes {
             direct: start.elapsed(),
@@ -338,6 +361,7 @@ impl Frame {
             return;
         }
         self.revision = scene.surface.revision;
+        let same_blocks = Arc::ptr_eq(&self.layout, &scene.layout);
         self.layout = scene.layout.clone();
         self.direct.clear();
         self.indirect.clear();
@@ -345,8 +369,11 @@ impl Frame {
         self.joint.fill(0.0);
         self.lightmap.fill([0.0; 3]);
         self.vector.fill(0.0);
-        if let Some(probes) = &mut self.probes {
-            probes.restart(scene);
+        match &mut self.probes {
+            Some(probes) if same_blocks => probes.darken(),
+            // This allocates; surfaces that change do not come here.
+            Some(probes) => probes.restart(scene),
+            None => {}
         }
         self.lights.restart(scene);
         self.blocks.restart(&scene.surface.emitting);
@@ -405,6 +432,8 @@ impl Frame {
     fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
         // Doors and shapes may differ where the number of texels does not.
         let pixels = scene.atlas.width * scene.atlas.height;
+        let slots = scene.shapes.iter().map(|shape| shape.folding.slots());
+        let (largest_block, largest_room) = (slots.max().unwrap_or(0), self.lights.slots());
         for (what, expected, found) in [
             ("texels", self.layout.texel_count(), scene.texel_count()),
             ("blocks", self.layout.block_count(), scene.blocks.len()),
@@ -412,6 +441,11 @@ impl Frame {
                 "texel slots",
                 self.direct.slots(),
                 scene.layout.slot_count(),
+            ),
+            (
+                "texel slots in a block",
+                largest_room,
+                largest_block.max(largest_room),
             ),
             (
                 "coefficients",
@@ -575,6 +609,11 @@ impl Frame {
     /// Time that each stage took, summed over the passes.
     pub fn times(&self) -> StageTimes {
         self.times
+    }
+
+    /// Blocks that the last frame worked on.
+    pub fn work(&self) -> FrameWork {
+        self.work
     }
 
     /// Passes of the last frame.

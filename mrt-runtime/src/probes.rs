@@ -162,9 +162,13 @@ impl Probes {
         }
     }
 
+    pub(crate) fn darken(&mut self) {
+        self.values.fill([0.0; 3]);
+    }
+
     /// Dark, and turned as another scene's blocks are.
     pub(crate) fn restart(&mut self, scene: &Scene) {
-        self.values.fill([0.0; 3]);
+        self.darken();
         for (to, block) in self.rotations.iter_mut().zip(&scene.blocks) {
             *to = band_rotations(&block.world_from_probe);
         }

@@ -1,7 +1,7 @@
 //! Direct light: only for blocks whose light may have changed.
 
 use super::pass::{CutPlanes, part_of, span};
-use super::{Bounces, Frame};
+use super::{Bounces, Frame, FrameWork};
 use crate::beam::{Beam, BeamTracer};
 use crate::direct::{TexelPlanes, add_beam, add_exact, irradiance};
 use crate::executor::{run_parts, task_count};
@@ -97,6 +97,11 @@ impl DirectStage {
         }
     }
 
+    /// Slots that a block may have.
+    pub(super) fn slots(&self) -> usize {
+        self.scratch.first().map_or(0, |scratch| scratch.len() / 3)
+    }
+
     /// Dark, whatever the scene.
     pub(super) fn restart(&mut self, scene: &Scene) {
         self.forget();
@@ -151,11 +156,10 @@ impl DirectStage {
             }
         }
         if self.overflow || had_overflow {
-            self.next_beams.truncate(if self.overflow {
-                0
-            } else {
-                self.next_beams.len()
-            });
+            if self.overflow {
+                self.next_beams.clear();
+                self.next_beams_of.clear();
+            }
             for block in 0..layout.block_count() as u32 {
                 self.wait_for(block);
             }
@@ -228,7 +232,7 @@ impl Frame {
         let same_shadows = same_source
             && version.is_some()
             && version == stage.version
-            && (source == Source::CallersRays || stage.doors == self.doors);
+            && stage.doors == self.doors;
         let by_beams = source == Source::Openings;
         if !same_source {
             // Wherever there is light of another kind.
@@ -258,13 +262,17 @@ impl Frame {
             _ => usize::MAX,
         };
         stage.take(most);
+        self.work = FrameWork {
+            direct: stage.list.len(),
+            ..FrameWork::default()
+        };
         if by_beams && !stage.overflow {
             stage.find_hits(scene);
         }
         let by_beams = by_beams && !stage.overflow;
         let level = self.config.simd;
         let executor = &*self.config.executor;
-        let tasks = task_count(executor, stage.list.len());
+        let tasks = task_count(executor, stage.list.len()).min(stage.scratch.len());
         let mut planes = CutPlanes::new(&mut self.direct);
         let mut found = &mut stage.found[..];
         let mut gone = 0;

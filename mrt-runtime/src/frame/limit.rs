@@ -13,13 +13,17 @@ const SPOT_GAIN: f64 = 0.05;
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
 /// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
 /// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
+/// Returns how many channels were scaled.
 pub(super) fn limit_flux(
     scene: &Scene,
     blocks: &mut Blocks,
     indirect: &mut Planes,
     joint: &mut [f32],
-) {
+) -> usize {
+    let mut limited = 0;
     let layout = &scene.layout;
+    // Sums in one order, whichever blocks came to have light first.
+    blocks.alive.sort_unstable();
     for channel in 0..3 {
         let (mut sent, mut arrived) = (0.0, 0.0);
         for &block in &blocks.alive {
@@ -31,6 +35,7 @@ pub(super) fn limit_flux(
             continue;
         }
         let scale = sent / arrived;
+        limited += 1;
         for k in 0..blocks.alive.len() {
             let block = blocks.alive[k];
             let place = block as usize;
@@ -49,4 +54,5 @@ pub(super) fn limit_flux(
         // Which blocks have what they would have anyway, is lost.
         blocks.all_stale = true;
     }
+    limited
 }

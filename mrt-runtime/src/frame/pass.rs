@@ -62,6 +62,11 @@ impl Frame {
         self.indirect.clear();
         self.blocks.has_coefficients.fill(false);
         self.blocks.lit = 0;
+        // Where truncation leaves walls dark, probes may still hold a little light, and no list knows of it.
+        self.vector.fill(0.0);
+        if let Some(probes) = &mut self.probes {
+            probes.darken();
+        }
         for k in 0..self.blocks.alive.len() {
             let block = self.blocks.alive[k];
             self.blocks.mark_changed(block);
@@ -100,6 +105,7 @@ impl Frame {
                 blocks.sources.push(block);
             }
         }
+        self.work.sources += blocks.sources.len();
         self.update_coefficients(scene, reflects_indirect);
         let blocks = &mut self.blocks;
         for k in 0..blocks.sources.len() {
@@ -130,6 +136,7 @@ impl Frame {
             blocks.targets.push(block);
         }
         blocks.targets.sort_unstable();
+        self.work.targets += blocks.targets.len();
         self.update_responses(scene);
         let after_responses = Instant::now();
         self.update_indirect(scene);
@@ -152,7 +159,8 @@ impl Frame {
             blocks.touch(block, resent);
             blocks.mark_changed(block);
         }
-        limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
+        self.work.limited +=
+            limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
         let peaks = self.blocks.alive.iter();
         let peak = peaks.fold(0.0f32, |m, &block| {
             m.max(self.blocks.state[block as usize].peak)
@@ -181,7 +189,10 @@ impl Frame {
             has_coefficients,
             ..
         } = &mut self.blocks;
-        let (list, tasks) = (&*sources, task_count(executor, sources.len()));
+        let (list, tasks) = (
+            &*sources,
+            task_count(executor, sources.len()).min(self.scratch.len()),
+        );
         let mut coefficients = Cut::new(&mut self.coefficients, size);
         let mut flags = Cut::new(has_coefficients, 1);
         let mut state = Cut::new(state, 1);
@@ -238,7 +249,7 @@ impl Frame {
         let size = 3 * layout.joint_stride;
         let (list, has_coefficients) = (&self.blocks.targets, &self.blocks.has_coefficients);
         let all_lit = self.blocks.lit == has_coefficients.len();
-        let tasks = task_count(executor, list.len());
+        let tasks = task_count(executor, list.len()).min(self.scratch.len());
         let mut joint = Cut::new(&mut self.joint, size);
         let parts = (0..tasks).map_while(|k| {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
@@ -273,7 +284,10 @@ impl Frame {
         // After one bounce nobody asks what changed.
         let compare = self.blocks.kept != Kept::Once;
         let Blocks { targets, state, .. } = &mut self.blocks;
-        let (list, tasks) = (&*targets, task_count(executor, targets.len()));
+        let (list, tasks) = (
+            &*targets,
+            task_count(executor, targets.len()).min(self.scratch.len()),
+        );
         let mut state = Cut::new(state, 1);
         let mut planes = CutPlanes::new(&mut self.indirect);
         let mut scratch = self.scratch.iter_mut();
