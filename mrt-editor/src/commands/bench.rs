@@ -17,7 +17,6 @@ mod timing;
 mod vpl;
 
 use crate::commands::accuracy::CouplingArg;
-use crate::commands::info::StorageArg;
 use crate::dictionary_source::{
     DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
 };
@@ -26,13 +25,12 @@ use machine::Machine;
 use measure::{Baseline, Bench, MeasureError};
 use mrt_core::container::write_file_atomically;
 use mrt_core::simd::SimdLevel;
-use mrt_core::storage::Storage;
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_runtime::assemble::Coupling;
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::level::MAX_BLOCKS;
-use ours::Variant;
+use ours::{Packing, Variant};
 use record::{Record, mark_pareto, significant};
 use reference::{Reference, ReferenceError};
 use setting::Setting;
@@ -67,14 +65,14 @@ pub struct BenchArgs {
     /// Also bakes the standard preset with these numbers of modes.
     #[arg(long, value_delimiter = ',', value_name = "MODES,...")]
     pub modes: Vec<usize>,
-    /// How operators are stored.
+    /// How operators are stored; mixed is f32 within blocks and f16 from block to block.
     #[arg(
         long,
         value_enum,
         value_delimiter = ',',
-        default_value = "f32,f16,int8"
+        default_value = "mixed,f32,f16,int8"
     )]
-    pub storages: Vec<StorageArg>,
+    pub storages: Vec<Packing>,
     /// How light is taken from block to block.
     #[arg(
         long,
@@ -313,7 +311,6 @@ fn measure_all(
 
 /// The settings to measure with a dictionary; the first is the one that others differ from.
 fn variants<'a>(args: &BenchArgs, named: &'a Named) -> Vec<Variant<'a>> {
-    let storages: Vec<Storage> = args.storages.iter().map(|&s| s.into()).collect();
     let couplings: Vec<Coupling> = args.coupling.iter().map(|&c| c.into()).collect();
     let mut levels = args.simd.clone();
     if levels.is_empty() {
@@ -326,7 +323,7 @@ fn variants<'a>(args: &BenchArgs, named: &'a Named) -> Vec<Variant<'a>> {
         threads = if cores > 1 { vec![1, cores] } else { vec![1] };
     }
     let mut variants = Vec::new();
-    for (a, &storage) in storages.iter().enumerate() {
+    for (a, &storage) in args.storages.iter().enumerate() {
         for (b, &coupling) in couplings.iter().enumerate() {
             for (c, &simd) in levels.iter().enumerate() {
                 for (d, &threads) in threads.iter().enumerate() {
