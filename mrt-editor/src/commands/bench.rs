@@ -241,6 +241,8 @@ fn report_goals(args: &BenchArgs, goals: &[Goal]) -> Result<(), BenchError> {
         }
     } else {
         crate::report!("{}", goals::table(goals));
+        crate::report_line!();
+        crate::report!("{}", goals::stages(goals));
     }
     Ok(())
 }

@@ -1,8 +1,9 @@
 //! What the frame is held to: times as multiples of other times, measured in turns with what they are compared with, and
 //! bytes.
 
+use super::machine::Shared;
 use super::measure::{Bench, MeasureError};
-use super::ours::{ALL_STAGES, INDIRECT_STAGES, Motion, Ours, Packing, Variant};
+use super::ours::{self, ALL_STAGES, INDIRECT_STAGES, Motion, Ours, Packing, Variant};
 use super::paper::{self, Paper};
 use super::record::{quoted, significant};
 use super::reference::Reference;
@@ -38,6 +39,8 @@ pub struct Goal {
     pub met: bool,
     /// What it is a ratio of.
     pub detail: String,
+    /// Median times of the stages of both, milliseconds; empty where they have none.
+    pub stages_ms: [Vec<f64>; 2],
 }
 
 impl Goal {
@@ -53,6 +56,7 @@ impl Goal {
             of_fastest,
             met,
             detail,
+            stages_ms: [Vec::new(), Vec::new()],
         }
     }
 
@@ -61,7 +65,14 @@ impl Goal {
         let [a, b] = [above, below].map(|timing| timing.times.median(timing.stages));
         let [c, d] = [above, below].map(|timing| timing.times.smallest(timing.stages));
         let [x, y] = [a, b].map(|seconds| significant(1e3 * seconds));
-        Self::new(figure, limit, [a / b, c / d], format!("{x} ms / {y} ms"))
+        let stages = |timing: Timing| {
+            let of_stage = |stage| 1e3 * timing.times.median(&[stage]);
+            (0..timing.times.stages()).map(of_stage).collect()
+        };
+        Self {
+            stages_ms: [above, below].map(stages),
+            ..Self::new(figure, limit, [a / b, c / d], format!("{x} ms / {y} ms"))
+        }
     }
 }
 
@@ -200,11 +211,17 @@ impl Bench<'_> {
                 threads: 2,
                 ..standard
             };
-            let [one, two] = self.pair((&level, standard), (&level, two))?;
+            let (mut one, mut two) = (new(&level, &standard)?, new(&level, &two)?);
+            let (mut alone, mut shared) = (Shared::new(1)?, Shared::new(2)?);
+            let mut subjects: [&mut dyn Timed; 4] = [&mut one, &mut two, &mut alone, &mut shared];
+            let times = in_turns(&mut subjects, self.budget, self.progress)?;
+            let [one, two, alone, shared] = [0, 1, 2, 3].map(|k| &times[k]);
+            let at_most = significant(alone.median(&[0]) / shared.median(&[0]));
             for (of, what) in [indirect, whole].into_iter().zip(["indirect", "frame"]) {
                 let figure = format!("maze1000, {what}: one thread / two threads");
-                let limit = Limit::AtLeast(1.7);
-                goals.push(Goal::ratio(&figure, limit, of(&one), of(&two)));
+                let goal = Goal::ratio(&figure, Limit::AtLeast(1.7), of(one), of(two));
+                let detail = format!("{}; sums in registers {at_most}", goal.detail);
+                goals.push(Goal { detail, ..goal });
             }
         } else {
             eprintln!("mrt: two threads are left out: this machine has one core");
@@ -213,13 +230,18 @@ impl Bench<'_> {
         next("maze10000, ten blocks lit")?;
         let large = Setting::together(10_000, LIGHTS_TOGETHER);
         let small = Setting::together(LIGHTS_TOGETHER, LIGHTS_TOGETHER);
-        let [large, small] = self.pair((&large, standard), (&small, standard))?;
-        goals.push(Goal::ratio(
-            "frame, the same ten lights: maze10000 / maze10",
+        let mut large = new(&large, &standard)?.with_motion(Motion::AllLights);
+        let mut small = new(&small, &standard)?.with_motion(Motion::AllLights);
+        let [of_large, of_small] = self.times([&mut large, &mut small])?;
+        let goal = Goal::ratio(
+            "ten lights close together move, frame: maze10000 / maze10",
             Limit::AtMost(2.0),
-            whole(&large),
-            whole(&small),
-        ));
+            whole(&of_large),
+            whole(&of_small),
+        );
+        let lit = [large, small].map(|ours| ours.lit_blocks());
+        let detail = format!("{}; {} and {} blocks lit", goal.detail, lit[0], lit[1]);
+        goals.push(Goal { detail, ..goal });
         Ok(goals)
     }
 
@@ -348,6 +370,26 @@ pub fn table(goals: &[Goal]) -> Table {
             if goal.met { "yes" } else { "no" }.to_owned(),
             goal.detail.clone(),
         ]);
+    }
+    table
+}
+
+/// Stages of whatever the figures compare, above and below the line.
+pub fn stages(goals: &[Goal]) -> Table {
+    let heads = [&["stages, ms", ""][..], &ours::STAGES].concat();
+    let mut table = Table::new(&heads);
+    for goal in goals {
+        for (stages, side) in goal.stages_ms.iter().zip(["above", "below"]) {
+            // The paper's products begin after direct light.
+            let skipped = usize::from(stages.len() < ours::STAGES.len());
+            if stages.is_empty() {
+                continue;
+            }
+            let blanks = std::iter::repeat_n(String::new(), skipped);
+            let times = stages.iter().map(|&ms| significant(ms));
+            let names = [goal.figure.clone(), side.to_owned()];
+            table.row(names.into_iter().chain(blanks).chain(times));
+        }
     }
     table
 }

@@ -160,6 +160,8 @@ pub enum Motion {
     Everything,
     /// The first light moves, and what does not depend on it is kept.
     OneLight,
+    /// All lights move, which leaves nothing of what they light, and blocks that stay dark as they are.
+    AllLights,
 }
 
 /// How far a moving light goes, in blocks: there and back in turns, always in its own block.
@@ -222,6 +224,17 @@ impl Ours {
         Self { motion, ..self }
     }
 
+    /// Moves the first lights there or back.
+    fn move_lights(&mut self, count: usize) {
+        self.is_moved = !self.is_moved;
+        let step = if self.is_moved { STEP } else { -STEP };
+        for light in &mut self.lights[..count] {
+            if let Light::Sphere { position, .. } = light {
+                position.x += step;
+            }
+        }
+    }
+
     /// Direct irradiance of the last frame, block by block in the level's order, in a block channel by channel.
     pub fn direct(&self) -> Vec<f32> {
         self.frame.direct()
@@ -235,6 +248,17 @@ impl Ours {
             indirect.map(f64::from)
         };
         receivers.iter().map(at).collect()
+    }
+
+    /// Blocks that indirect light reached in the last frame.
+    pub fn lit_blocks(&self) -> usize {
+        let indirect = self.frame.indirect();
+        let blocks = self.scene.blocks.iter().map(|block| &block.texels);
+        let is_lit = |texels: &&std::ops::Range<usize>| {
+            let values = &indirect[3 * texels.start..3 * texels.end];
+            values.iter().any(|&e| e > 0.0)
+        };
+        blocks.filter(is_lit).count()
     }
 
     /// Bytes that the scene and the frame hold while frames are computed.
@@ -324,13 +348,8 @@ impl Timed for Ours {
     fn run(&mut self) -> Vec<f64> {
         match self.motion {
             Motion::Everything => self.frame.forget(),
-            Motion::OneLight => {
-                self.is_moved = !self.is_moved;
-                let step = if self.is_moved { STEP } else { -STEP };
-                if let Some(Light::Sphere { position, .. }) = self.lights.first_mut() {
-                    position.x += step;
-                }
-            }
+            Motion::OneLight => self.move_lights(1),
+            Motion::AllLights => self.move_lights(self.lights.len()),
         }
         let (frame, scene, lights) = (&mut self.frame, &self.scene, &self.lights);
         let mut solve = || frame.solve(scene, lights, &Openings, Bounces::Count(1));
