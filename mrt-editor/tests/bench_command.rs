@@ -125,7 +125,7 @@ fn wrong_flags_are_refused_with_what_was_expected() {
         (&["--blocks", "0"][..], 2, "expected 1 to 100000 blocks"),
         (&["--blocks", "many"], 2, "expected 1 to 100000 blocks"),
         (&["--simd", "mmx"], 2, "this machine has scalar"),
-        (&["--storages", "f64"], 2, "f32, f16, int8"),
+        (&["--storages", "f64"], 2, "mixed, f32, f16, int8"),
         (&["--coupling", "none"], 2, "table, lightfield"),
         (&["--threads", "0"], 2, "1..=256"),
         (

@@ -3,6 +3,7 @@
 mod chart;
 mod dense;
 mod gather;
+mod goals;
 mod library;
 mod machine;
 mod measure;
@@ -17,22 +18,21 @@ mod timing;
 mod vpl;
 
 use crate::commands::accuracy::CouplingArg;
-use crate::commands::info::StorageArg;
 use crate::dictionary_source::{
     DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
 };
 use crate::picture::file::WriteError;
+use goals::{Goal, Presets};
 use machine::Machine;
 use measure::{Baseline, Bench, MeasureError};
 use mrt_core::container::write_file_atomically;
 use mrt_core::simd::SimdLevel;
-use mrt_core::storage::Storage;
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_runtime::assemble::Coupling;
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::level::MAX_BLOCKS;
-use ours::Variant;
+use ours::{Packing, Variant};
 use record::{Record, mark_pareto, significant};
 use reference::{Reference, ReferenceError};
 use setting::Setting;
@@ -67,14 +67,14 @@ pub struct BenchArgs {
     /// Also bakes the standard preset with these numbers of modes.
     #[arg(long, value_delimiter = ',', value_name = "MODES,...")]
     pub modes: Vec<usize>,
-    /// How operators are stored.
+    /// How operators are stored; mixed is f32 within blocks and f16 from block to block.
     #[arg(
         long,
         value_enum,
         value_delimiter = ',',
-        default_value = "f32,f16,int8"
+        default_value = "mixed,f32,f16,int8"
     )]
-    pub storages: Vec<StorageArg>,
+    pub storages: Vec<Packing>,
     /// How light is taken from block to block.
     #[arg(
         long,
@@ -92,6 +92,10 @@ pub struct BenchArgs {
     /// All combinations of storage, coupling, instructions and threads.
     #[arg(long)]
     pub product: bool,
+    /// Measures only what the frame is held to, and says what is met; what needs the quality preset asks for its file with
+    /// --dictionary, or for --presets quality.
+    #[arg(long)]
+    pub figures: bool,
     /// Fewer mazes and dictionaries, and less time for each: about two minutes.
     #[arg(long)]
     pub quick: bool,
@@ -149,6 +153,10 @@ pub enum BenchError {
     Report(#[from] serde_json::Error),
 }
 
+/// Presets that are baked where they are asked for.
+const MOBILE: &str = "mobile";
+const QUALITY: &str = "quality";
+
 /// A dictionary and what it is called.
 struct Named {
     name: String,
@@ -180,13 +188,24 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
             libraries: library::Libraries::default(),
             progress,
         };
-        measure_all(args, &dictionaries, &kept, &mut bench, progress)
+        if args.figures {
+            let goals = bench.goals(presets(&dictionaries), &kept)?;
+            return Ok((Vec::new(), goals));
+        }
+        let records = measure_all(args, &dictionaries, &kept, &mut bench, progress)?;
+        Ok((records, Vec::new()))
     });
-    let records = measured.map_err(|error| match error {
-        BenchError::Measure(MeasureError::Cancelled(cancelled))
+    let (records, goals) = measured.map_err(|error| match error {
+        BenchError::Measure(
+            MeasureError::Cancelled(cancelled)
+            | MeasureError::Reference(ReferenceError::Cancelled(cancelled)),
+        )
         | BenchError::Reference(ReferenceError::Cancelled(cancelled)) => cancelled.into(),
         other => other,
     })?;
+    if args.figures {
+        return report_goals(args, &goals);
+    }
     write_files(&args.out, &records, &machine)?;
     if args.json {
         for record in &records {
@@ -194,6 +213,36 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
         }
     } else {
         print(&records, &machine);
+    }
+    Ok(())
+}
+
+/// Those that figures speak of; [`dictionaries`] has them.
+fn presets(dictionaries: &[Named]) -> Presets<'_> {
+    let named = |name: &str| {
+        let mut all = dictionaries.iter();
+        all.find(|named| named.name == name)
+            .map(|named| &named.dictionary)
+    };
+    let added = "figures add it where it is not given";
+    Presets {
+        standard: named(DEFAULT_PRESET).expect(added),
+        mobile: named(MOBILE).expect(added),
+        quality: named(QUALITY),
+    }
+}
+
+fn report_goals(args: &BenchArgs, goals: &[Goal]) -> Result<(), BenchError> {
+    let path = args.out.join("figures.csv");
+    write_file_atomically(&path, goals::csv(goals).as_bytes()).map_err(WriteError::File)?;
+    if args.json {
+        for goal in goals {
+            crate::report_line!("{}", serde_json::to_string(goal)?);
+        }
+    } else {
+        crate::report!("{}", goals::table(goals));
+        crate::report_line!();
+        crate::report!("{}", goals::stages(goals));
     }
     Ok(())
 }
@@ -212,25 +261,34 @@ fn dictionaries(args: &BenchArgs) -> Result<Vec<Named>, BenchError> {
     let presets: Vec<&str> = match (args.presets.is_empty(), args.dictionary.is_empty()) {
         (false, _) => args.presets.iter().map(String::as_str).collect(),
         (true, false) => Vec::new(),
-        (true, true) if args.quick => vec![DEFAULT_PRESET, "mobile"],
-        (true, true) => vec![DEFAULT_PRESET, "mobile", "quality"],
+        (true, true) if args.figures => Vec::new(),
+        (true, true) if args.quick => vec![DEFAULT_PRESET, MOBILE],
+        (true, true) => vec![DEFAULT_PRESET, MOBILE, QUALITY],
     };
     // All names are checked before the first bake.
     for preset in &presets {
         BakeConfig::preset(preset)?;
     }
     let sweep = sweep(args)?;
+    let set = crate::dictionary_source::DEFAULT_SET;
     for file in &args.dictionary {
         let dictionary = from_file(file)?;
         add(dictionary.preset.replace('/', "-"), dictionary);
     }
     for preset in presets {
-        let set = crate::dictionary_source::DEFAULT_SET;
         add(preset.to_owned(), from_preset(set, Some(preset))?);
     }
     for config in sweep {
         let dictionary = bake_with_progress(&config).map_err(SourceError::Cancelled)?;
         add(config.preset.clone(), dictionary);
+    }
+    if args.figures {
+        for preset in [DEFAULT_PRESET, MOBILE] {
+            if !found.iter().any(|named| named.name == preset) {
+                let (name, dictionary) = (preset.to_owned(), from_preset(set, Some(preset))?);
+                found.push(Named { name, dictionary });
+            }
+        }
     }
     Ok(found)
 }
@@ -313,7 +371,6 @@ fn measure_all(
 
 /// The settings to measure with a dictionary; the first is the one that others differ from.
 fn variants<'a>(args: &BenchArgs, named: &'a Named) -> Vec<Variant<'a>> {
-    let storages: Vec<Storage> = args.storages.iter().map(|&s| s.into()).collect();
     let couplings: Vec<Coupling> = args.coupling.iter().map(|&c| c.into()).collect();
     let mut levels = args.simd.clone();
     if levels.is_empty() {
@@ -326,7 +383,7 @@ fn variants<'a>(args: &BenchArgs, named: &'a Named) -> Vec<Variant<'a>> {
         threads = if cores > 1 { vec![1, cores] } else { vec![1] };
     }
     let mut variants = Vec::new();
-    for (a, &storage) in storages.iter().enumerate() {
+    for (a, &storage) in args.storages.iter().enumerate() {
         for (b, &coupling) in couplings.iter().enumerate() {
             for (c, &simd) in levels.iter().enumerate() {
                 for (d, &threads) in threads.iter().enumerate() {

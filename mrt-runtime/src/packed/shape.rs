@@ -232,13 +232,17 @@ impl PackedShape {
 
     /// Bytes of all operators.
     pub fn bytes(&self) -> usize {
-        self.rows.bytes()
-            + size_of_val(self.groups.as_slice())
-            + self.joint.bytes()
-            + self.joint_columns.bytes()
-            + size_of_val(self.joint_scales.as_slice())
-            + self.probes.bytes()
-            + self.vector.bytes()
+        self.stage_bytes().iter().sum::<usize>() + self.probes.bytes() + self.vector.bytes()
+    }
+
+    /// Bytes of `T_d->b` and of the joint basis.
+    pub fn stage_bytes(&self) -> [usize; 2] {
+        [
+            self.rows.bytes() + size_of_val(self.groups.as_slice()),
+            self.joint.bytes()
+                + self.joint_columns.bytes()
+                + size_of_val(self.joint_scales.as_slice()),
+        ]
     }
 
     /// Multiply-adds of `T_d->b` and of the joint basis for one block, three channels, without padding.

@@ -66,6 +66,7 @@ impl Dense {
         let count = exact.texel_count();
         let operator = Matrix::from_fn(count, count, |i, j| transport.factor(i, j) as f32);
         let mut radiosity = Matrix::zeros(count, 3);
+        let direct = ours.direct();
         for wall in exact.walls() {
             let range = &ours.scene.blocks[wall.block].texels;
             for k in 0..resolution * resolution {
@@ -73,8 +74,7 @@ impl Dense {
                 let at = ours.scene.level_texel(wall.block, wall.face, row, column);
                 for channel in 0..3 {
                     let from = 3 * range.start + channel * range.len() + at.unwrap_or(0);
-                    radiosity[(wall.first_texel + k, channel)] =
-                        ALBEDO[channel] * ours.direct()[from];
+                    radiosity[(wall.first_texel + k, channel)] = ALBEDO[channel] * direct[from];
                 }
             }
         }

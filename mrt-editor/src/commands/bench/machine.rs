@@ -1,9 +1,11 @@
 //! What this machine can do at most, measured in the same process as what it is compared with.
 
-use super::timing::fastest;
+use super::timing::{Timed, fastest};
 use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::hint::black_box;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Sums that a core can keep going at once: four cycles of latency times two units is eight, and some are spare.
 const ACCUMULATORS: usize = 12;
@@ -57,6 +59,40 @@ impl Machine {
     /// GB/s read from memory.
     pub fn memory(&self) -> f64 {
         self.bandwidth(usize::MAX)
+    }
+}
+
+/// Sums that fit into registers, shared out between threads that need nothing from each other: how much faster these get
+/// done is all that the machine gives to anybody.
+pub struct Shared(ThreadPool);
+
+/// Parts of [`Shared`].
+const PARTS: usize = 16;
+
+impl Shared {
+    /// With so many threads.
+    ///
+    /// # Errors
+    /// If the system gives no threads.
+    pub fn new(threads: usize) -> Result<Self, ThreadPoolBuildError> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
+        Ok(Self(pool))
+    }
+}
+
+impl Timed for Shared {
+    fn run(&mut self) -> Vec<f64> {
+        let level = SimdLevel::detect();
+        let part = |_| {
+            black_box(level.run(FusedSums {
+                factor: black_box(0.999),
+                term: black_box(1e-3),
+            }));
+        };
+        let start = Instant::now();
+        self.0
+            .install(|| (0..PARTS).into_par_iter().with_max_len(1).for_each(part));
+        vec![start.elapsed().as_secs_f64()]
     }
 }
 

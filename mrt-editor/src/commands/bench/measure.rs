@@ -61,6 +61,9 @@ pub enum MeasureError {
     /// The exact light.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// Threads to compare with.
+    #[error("no threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// A way that does not give the level's light.
     #[error(
         "{case}: indirect light is {found:.3} times the exact one in all; expected within {FLUX_TOLERANCE} of 1"

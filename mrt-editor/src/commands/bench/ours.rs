@@ -7,10 +7,51 @@ use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
 use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, FrameError};
+use mrt_runtime::executor::{Executor, Rayon, Serial};
+use mrt_runtime::frame::{Bounces, Frame, FrameConfig, FrameError};
 use mrt_runtime::light::Light;
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::Openings;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use std::sync::Arc;
+
+/// How a scene's operators are stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Packing {
+    /// `f32` within blocks and `f16` from block to block: what games get unless they ask.
+    Mixed,
+    /// Four bytes a number, exact.
+    F32,
+    /// Two bytes a number.
+    F16,
+    /// One byte a number.
+    Int8,
+}
+
+impl Packing {
+    /// "mixed", "f32", "f16" or "int8".
+    pub fn name(self) -> &'static str {
+        match self {
+            Packing::Mixed => "mixed",
+            Packing::F32 => Storage::F32.name(),
+            Packing::F16 => Storage::F16.name(),
+            Packing::Int8 => Storage::Int8.name(),
+        }
+    }
+
+    /// Storage within blocks and from block to block.
+    fn storages(self) -> [Storage; 2] {
+        match self {
+            Packing::Mixed => {
+                let usual = AssembleConfig::default();
+                [usual.shape_storage, usual.transport_storage]
+            }
+            Packing::F32 => [Storage::F32; 2],
+            Packing::F16 => [Storage::F16; 2],
+            Packing::Int8 => [Storage::Int8; 2],
+        }
+    }
+}
 
 /// One way to compute a frame.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +61,7 @@ pub struct Variant<'a> {
     /// The operators.
     pub dictionary: &'a Dictionary,
     /// How they are stored.
-    pub storage: Storage,
+    pub storage: Packing,
     /// How light goes from block to block.
     pub coupling: Coupling,
     /// Instructions.
@@ -29,8 +70,8 @@ pub struct Variant<'a> {
     pub threads: usize,
 }
 
-/// Bytes that scenes of the benchmark may take: 10,000 blocks with the standard preset take 2.7 GB, and what they are
-/// compared with as much again.
+/// Bytes that scenes of the benchmark may take: 10,000 blocks with the quality preset take more than 2 GiB, and what
+/// they are compared with several times as much.
 const MAX_BYTES: usize = 4 << 30;
 
 /// Settings for assembling with a coupling.
@@ -43,10 +84,10 @@ pub fn assemble_config(coupling: Coupling) -> AssembleConfig {
 }
 
 impl Variant<'_> {
-    /// Such as "standard/avx2/t1", with the storage unless it is `f32` and the coupling unless it is the table.
+    /// Such as "standard/avx2/t1", with the storage unless it is mixed and the coupling unless it is the table.
     pub fn name(&self) -> String {
         let mut name = format!("{}/{}/t{}", self.preset, self.simd.name(), self.threads);
-        if self.storage != Storage::F32 {
+        if self.storage != Packing::Mixed {
             name = format!("{name}/{}", self.storage.name());
         }
         if self.coupling != Coupling::Table {
@@ -65,6 +106,9 @@ pub enum OursError {
     /// The lights are refused.
     #[error(transparent)]
     Frame(#[from] FrameError),
+    /// The system gives no threads.
+    #[error("no threads: {0}")]
+    Threads(#[from] ThreadPoolBuildError),
 }
 
 impl OursError {
@@ -83,14 +127,45 @@ pub const INDIRECT_STAGES: [usize; 3] = [1, 2, 3];
 /// From lights to indirect light.
 pub const LIGHT_STAGES: [usize; 4] = [0, 1, 2, 3];
 
+/// A whole frame.
+pub const ALL_STAGES: [usize; 5] = [0, 1, 2, 3, 4];
+
 /// What a stage has to do at least.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
-    /// Operations of the dense products, a product and a sum being two; 0 for stages that are no product.
+    /// Operations of the products that are made, a product and a sum being two; 0 for stages that are no product.
     pub flops: f64,
     /// Bytes that it reads and writes, each once.
     pub bytes: f64,
 }
+
+/// Exactly so many threads, none of which is the caller's: a frame is best called from one of them.
+#[derive(Clone, Debug)]
+struct Pool(Arc<ThreadPool>);
+
+impl Executor for Pool {
+    fn workers(&self) -> usize {
+        self.0.current_num_threads()
+    }
+
+    fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync)) {
+        self.0.install(|| Rayon.run(tasks, task));
+    }
+}
+
+/// What happens between two frames that are timed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Motion {
+    /// Everything is forgotten, so that a frame does all that it can have to do.
+    Everything,
+    /// The first light moves, and what does not depend on it is kept.
+    OneLight,
+    /// All lights move, which leaves nothing of what they light, and blocks that stay dark as they are.
+    AllLights,
+}
+
+/// How far a moving light goes, in blocks: there and back in turns, always in its own block.
+const STEP: f32 = 0.05;
 
 /// A scene and its frame.
 pub struct Ours {
@@ -98,6 +173,9 @@ pub struct Ours {
     pub scene: Scene,
     frame: Frame,
     lights: Vec<Light>,
+    motion: Motion,
+    is_moved: bool,
+    pool: Option<Pool>,
 }
 
 impl Ours {
@@ -106,25 +184,59 @@ impl Ours {
     /// # Errors
     /// [`OursError`].
     pub fn new(setting: &Setting, variant: &Variant) -> Result<Self, OursError> {
-        let config = assemble_config(variant.coupling);
-        let scene = match variant.storage {
-            Storage::F32 => assemble(&setting.level, variant.dictionary, &config)?,
-            storage => {
-                let stored = variant.dictionary.stored_as(storage);
-                assemble(&setting.level, &stored, &config)?
+        let [shape_storage, transport_storage] = variant.storage.storages();
+        let config = AssembleConfig {
+            shape_storage,
+            transport_storage,
+            ..assemble_config(variant.coupling)
+        };
+        let scene = assemble(&setting.level, variant.dictionary, &config)?;
+        let pool = match variant.threads {
+            0 | 1 => None,
+            threads => {
+                let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
+                Some(Pool(Arc::new(pool)))
             }
         };
-        let mut frame = Frame::new(&scene);
+        let executor: Arc<dyn Executor> = match &pool {
+            None => Arc::new(Serial),
+            Some(pool) => Arc::new(pool.clone()),
+        };
+        let config = FrameConfig {
+            simd: variant.simd,
+            executor,
+            ..FrameConfig::default()
+        };
+        let mut frame = Frame::with_config(&scene, config);
         frame.solve(&scene, &setting.lights, &Openings, Bounces::Count(1))?;
         Ok(Self {
             scene,
             frame,
             lights: setting.lights.clone(),
+            motion: Motion::Everything,
+            is_moved: false,
+            pool,
         })
     }
 
-    /// Direct irradiance, as the frame orders it.
-    pub fn direct(&self) -> &[f32] {
+    /// The same with another motion.
+    pub fn with_motion(self, motion: Motion) -> Self {
+        Self { motion, ..self }
+    }
+
+    /// Moves the first lights there or back.
+    fn move_lights(&mut self, count: usize) {
+        self.is_moved = !self.is_moved;
+        let step = if self.is_moved { STEP } else { -STEP };
+        for light in &mut self.lights[..count] {
+            if let Light::Sphere { position, .. } = light {
+                position.x += step;
+            }
+        }
+    }
+
+    /// Direct irradiance of the last frame, block by block in the level's order, in a block channel by channel.
+    pub fn direct(&self) -> Vec<f32> {
         self.frame.direct()
     }
 
@@ -138,60 +250,85 @@ impl Ours {
         receivers.iter().map(at).collect()
     }
 
+    /// Blocks that indirect light reached in the last frame.
+    pub fn lit_blocks(&self) -> usize {
+        let indirect = self.frame.indirect();
+        let blocks = self.scene.blocks.iter().map(|block| &block.texels);
+        let is_lit = |texels: &&std::ops::Range<usize>| {
+            let values = &indirect[3 * texels.start..3 * texels.end];
+            values.iter().any(|&e| e > 0.0)
+        };
+        blocks.filter(is_lit).count()
+    }
+
     /// Bytes that the scene and the frame hold while frames are computed.
     pub fn resident_bytes(&self) -> usize {
         let scene = &self.scene;
-        // Positions, normals, albedo and emission; direct, indirect and previous light, and radiosity.
-        let texels = scene.texel_count() * (4 * 12 + 4 * 12);
-        let signals = 12 * (scene.coefficient_count + scene.joint_count);
+        // Positions, normals, albedo and emission; direct and indirect light.
+        let slots = scene.layout.slot_count() * (4 * RGB_BYTES + 2 * RGB_BYTES);
         let lightmap = size_of_val(self.frame.lightmap());
-        scene.operator_bytes() + texels + signals + lightmap
+        scene.operator_bytes() + slots + self.signal_bytes().iter().sum::<usize>() + lightmap
     }
 
-    /// What each of [`STAGES`] has to do.
+    /// Bytes of b and r of all blocks.
+    fn signal_bytes(&self) -> [usize; 2] {
+        let layout = &self.scene.layout;
+        [layout.coefficient_stride, layout.joint_stride]
+            .map(|stride| RGB_BYTES * stride * layout.block_count())
+    }
+
+    /// What each of [`STAGES`] has to do where every block is lit: the products as they are made, folded by mirrors and
+    /// without what is negligible.
     pub fn costs(&self) -> [Cost; STAGES.len()] {
         let scene = &self.scene;
-        let rgb = 12.0 * scene.texel_count() as f64;
-        let (b, joint) = (
-            12.0 * scene.coefficient_count as f64,
-            12.0 * scene.joint_count as f64,
-        );
-        let of_shapes = |numbers: &dyn Fn(usize) -> usize| -> f64 {
-            (0..scene.shapes.len())
-                .map(|k| 4.0 * numbers(k) as f64)
-                .sum()
-        };
-        let of_blocks = |modes: &dyn Fn(usize) -> usize| -> f64 {
-            let blocks = (0..scene.blocks.len()).map(|k| scene.blocks[k].texels.len() * modes(k));
-            blocks.map(|products| 6.0 * products as f64).sum()
-        };
-        let transport = scene.transport.bytes() as f64;
+        let layout = &scene.layout;
+        let slots = (RGB_BYTES * layout.slot_count()) as f64;
+        let [b, joint] = self.signal_bytes().map(|bytes| bytes as f64);
+        let lightmap = size_of_val(self.frame.lightmap()) as f64;
+        let mut sums = [0.0; 2];
+        for &shape in &layout.shapes {
+            let of_block = scene.shapes[shape as usize].multiply_adds();
+            for (sum, products) in sums.iter_mut().zip(of_block) {
+                *sum += 2.0 * products as f64;
+            }
+        }
+        let [from_direct, to_texels] = sums;
+        let mut operators = [0.0; 2];
+        for shape in &scene.shapes {
+            for (sum, bytes) in operators.iter_mut().zip(shape.stage_bytes()) {
+                *sum += bytes as f64;
+            }
+        }
+        let [transport, _] = scene.transport.multiply_adds();
         [
+            // Positions and normals in, direct light out.
             Cost {
                 flops: 0.0,
-                bytes: 3.0 * rgb,
+                bytes: 3.0 * slots,
+            },
+            // Direct light and albedo in.
+            Cost {
+                flops: from_direct,
+                bytes: operators[0] + 2.0 * slots + b,
             },
             Cost {
-                flops: of_blocks(&|k| scene.blocks[k].coefficients.len()),
-                bytes: of_shapes(&|k| scene.shapes[k].coefficients_from_direct.data().len())
-                    + 2.0 * rgb
-                    + b,
+                flops: 2.0 * transport as f64,
+                bytes: scene.transport.bytes() as f64 + b + joint,
             },
             Cost {
-                flops: 6.0 * transport / 4.0,
-                bytes: transport + b + joint,
-            },
-            Cost {
-                flops: of_blocks(&|k| scene.blocks[k].joint.len()),
-                bytes: of_shapes(&|k| scene.shapes[k].joint_basis.data().len()) + joint + rgb,
+                flops: to_texels,
+                bytes: operators[1] + joint + slots,
             },
             Cost {
                 flops: 0.0,
-                bytes: rgb + size_of_val(self.frame.lightmap()) as f64,
+                bytes: slots + lightmap,
             },
         ]
     }
 }
+
+/// Bytes of three numbers.
+const RGB_BYTES: usize = 12;
 
 /// Index of a receiver's texel in its block.
 pub fn texel_of(scene: &Scene, receiver: &Receiver) -> usize {
@@ -209,9 +346,18 @@ pub fn texel_of(scene: &Scene, receiver: &Receiver) -> usize {
 
 impl Timed for Ours {
     fn run(&mut self) -> Vec<f64> {
-        self.frame
-            .solve(&self.scene, &self.lights, &Openings, Bounces::Count(1))
-            .expect("the first frame was accepted");
+        match self.motion {
+            Motion::Everything => self.frame.forget(),
+            Motion::OneLight => self.move_lights(1),
+            Motion::AllLights => self.move_lights(self.lights.len()),
+        }
+        let (frame, scene, lights) = (&mut self.frame, &self.scene, &self.lights);
+        let mut solve = || frame.solve(scene, lights, &Openings, Bounces::Count(1));
+        match &self.pool {
+            None => solve(),
+            Some(Pool(threads)) => threads.install(solve),
+        }
+        .expect("the first frame was accepted");
         let times = self.frame.times();
         [
             times.direct,

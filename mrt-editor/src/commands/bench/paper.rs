@@ -11,7 +11,7 @@ use super::setting::Setting;
 use super::timing::Timed;
 use mrt_core::matrix::{Matrix, MatrixView, multiply, multiply_add};
 use mrt_runtime::assemble::{AssembleError, Coupling};
-use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::dictionary::{Dictionary, ShapeOperators};
 use mrt_runtime::opening_responses::{OpeningResponses, responses_by_opening};
 use mrt_runtime::scene::Scene;
 use std::collections::BTreeMap;
@@ -104,7 +104,7 @@ impl Paper {
             .map(|shape| response_bases(scene, dictionary, shape))
             .collect();
         let kept = strongest_modes(scene, &bases, &all, dictionary.response_modes());
-        let mut groups = groups(scene, ours.direct(), &bases, &kept);
+        let mut groups = groups(scene, dictionary, &ours.direct(), &bases, &kept);
         let mut place = vec![(0, 0); scene.blocks.len()];
         for (g, group) in groups.iter().enumerate() {
             for (k, &block) in group.blocks.iter().enumerate() {
@@ -260,11 +260,21 @@ impl Paper {
     }
 }
 
+/// A shape of the scene as the dictionary has it.
+fn operators<'a>(
+    scene: &Scene,
+    dictionary: &'a Dictionary,
+    shape: usize,
+) -> Option<&'a ShapeOperators> {
+    let block = scene.blocks.iter().find(|b| b.shape_index == shape)?;
+    dictionary
+        .shape_index(block.shape)
+        .map(|k| &dictionary.shapes[k])
+}
+
 /// `U_r` of each opening of a shape of the scene, with all response modes.
 fn response_bases(scene: &Scene, dictionary: &Dictionary, shape: usize) -> Vec<Matrix<f32>> {
-    let block = scene.blocks.iter().find(|b| b.shape_index == shape);
-    let entry = block.and_then(|b| dictionary.shape_index(b.shape));
-    let Some(entry) = entry.map(|k| &dictionary.shapes[k]) else {
+    let Some(entry) = operators(scene, dictionary, shape) else {
         return Vec::new();
     };
     let bases = entry.openings.iter().filter_map(|opening| {
@@ -299,8 +309,15 @@ fn strongest_modes(
     order
 }
 
-fn groups(scene: &Scene, direct: &[f32], bases: &[Vec<Matrix<f32>>], kept: &[usize]) -> Vec<Group> {
-    let group = |(shape, operators): (usize, &mrt_runtime::scene::SceneShape)| {
+fn groups(
+    scene: &Scene,
+    dictionary: &Dictionary,
+    direct: &[f32],
+    bases: &[Vec<Matrix<f32>>],
+    kept: &[usize],
+) -> Vec<Group> {
+    let group = |shape: usize| {
+        let operators = operators(scene, dictionary, shape)?;
         let of_shape = |&block: &usize| scene.blocks[block].shape_index == shape;
         let blocks: Vec<usize> = (0..scene.blocks.len()).filter(of_shape).collect();
         let (modes, texels) = (
@@ -311,14 +328,14 @@ fn groups(scene: &Scene, direct: &[f32], bases: &[Vec<Matrix<f32>>], kept: &[usi
         let light = Matrix::from_fn(texels, columns, |texel, column| {
             let range = &scene.blocks[blocks[column / 3]].texels;
             let channel = column % 3;
-            let albedo = scene.texel_albedo[range.start + texel][channel];
+            let albedo = scene.texel_albedo(range.start + texel)[channel];
             albedo * direct[3 * range.start + channel * range.len() + texel]
         });
         let response_bases: Vec<Matrix<f32>> = bases[shape]
             .iter()
             .map(|basis| Matrix::from_fn(texels, kept.len(), |i, j| basis[(i, kept[j])]))
             .collect();
-        Group {
+        Some(Group {
             coefficients_from_direct: operators.coefficients_from_direct.clone(),
             indirect_basis: operators.joint_basis.leading_columns(modes),
             libraries: [Library::Gemm; 3],
@@ -328,9 +345,9 @@ fn groups(scene: &Scene, direct: &[f32], bases: &[Vec<Matrix<f32>>], kept: &[usi
             irradiance: Matrix::zeros(texels, columns),
             response_bases,
             blocks,
-        }
+        })
     };
-    scene.shapes.iter().enumerate().map(group).collect()
+    (0..scene.shapes.len()).filter_map(group).collect()
 }
 
 /// Responses gathered by where they arrive.

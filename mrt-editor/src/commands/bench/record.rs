@@ -180,7 +180,7 @@ pub fn machine_csv(machine: &Machine) -> String {
 }
 
 /// A field of CSV: dictionaries may have any name.
-fn quoted(field: &str) -> String {
+pub fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\n']) {
         format!("\"{}\"", field.replace('"', "\"\""))
     } else {

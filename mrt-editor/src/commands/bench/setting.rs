@@ -40,8 +40,32 @@ impl Setting {
         let count = level.blocks.len();
         let usual = (count / BLOCKS_PER_LIGHT).clamp(1, MOST_LIGHTS);
         let lights = lights.unwrap_or(usual).clamp(1, count);
-        let place = |light: usize| {
-            let block = (2 * light + 1) * count / (2 * lights);
+        let lit = (0..lights).map(|light| (2 * light + 1) * count / (2 * lights));
+        Self::with_lights_in(format!("maze{blocks}"), level, &lit.collect::<Vec<_>>())
+    }
+
+    /// A maze of so many blocks, with lights in those that fewest openings part from the one in the middle.
+    pub fn together(blocks: usize, lights: usize) -> Self {
+        let level = maze(blocks, ALBEDO, SEED);
+        let neighbours = level.neighbours();
+        // Mazes are nearly square, row after row.
+        let count = level.blocks.len();
+        let width = (count as f64).sqrt().ceil() as usize;
+        let mut lit = vec![(count / 2 + width / 2).min(count - 1)];
+        let mut next = 0;
+        while next < lit.len() && lit.len() < lights {
+            for opening in neighbours[lit[next]].iter().flatten() {
+                if !lit.contains(&opening.block) && lit.len() < lights {
+                    lit.push(opening.block);
+                }
+            }
+            next += 1;
+        }
+        Self::with_lights_in(format!("maze{blocks}"), level, &lit)
+    }
+
+    fn with_lights_in(name: String, level: Level, lit: &[usize]) -> Self {
+        let place = |(light, &block): (usize, &usize)| {
             let jitter = |axis: u32| {
                 let unit = f64::from(hash(light as u32, axis)) / f64::from(u32::MAX);
                 (2.0 * unit - 1.0) * JITTER
@@ -54,8 +78,8 @@ impl Setting {
             }
         };
         Self {
-            name: format!("maze{blocks}"),
-            lights: (0..lights).map(place).collect(),
+            name,
+            lights: lit.iter().enumerate().map(place).collect(),
             level,
         }
     }
@@ -103,5 +127,14 @@ mod tests {
         }
         assert_eq!(Setting::new(41, None).lights.len(), 4);
         assert_eq!(Setting::new(5, Some(9)).lights.len(), 5);
+        assert_eq!(Setting::together(10, 10).lights.len(), 10);
+    }
+
+    #[test]
+    fn lights_together_are_few_openings_apart() {
+        let positions = Setting::together(400, 10).spheres();
+        assert_eq!(positions.len(), 10);
+        let far = |a: &(Vec3, f32, Vec3)| positions.iter().any(|b| a.0.distance(b.0) > 12.0);
+        assert!(!positions.iter().any(far));
     }
 }

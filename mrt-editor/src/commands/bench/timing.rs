@@ -30,6 +30,11 @@ impl Times {
         self.sums(stages).into_iter().fold(f64::INFINITY, f64::min)
     }
 
+    /// Number of stages.
+    pub fn stages(&self) -> usize {
+        self.runs.first().map_or(0, Vec::len)
+    }
+
     /// Number of runs.
     pub fn count(&self) -> usize {
         self.runs.len()

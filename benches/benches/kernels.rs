@@ -1,0 +1,583 @@
+//! The frame's kernels one by one, and the same products by libraries: `cargo bench -p mrt-benches`, with `--features
+//! faer` for one library more.
+//!
+//! Every kernel's answer is compared with sums in `f64` before it is timed. Rates count products, not operations. The
+//! fastest instructions of the machine are used, or those that the variable `MRT_SIMD` names.
+
+#![allow(
+    missing_docs,
+    reason = "names of benchmarks say what they measure; the macro leaves public items behind"
+)]
+
+use divan::{Bencher, black_box, counter::ItemsCount};
+use mrt_core::simd::folded::{Reflected, Unfolded, fold, unfold};
+use mrt_core::simd::tiles::{
+    CHANNELS, ColumnLists, DOT_ROWS, Element, HALF_TILE, Rgb, TILE, Term, TileSums, add_half_tile,
+    add_tile, add_two_tiles, dot_rows,
+};
+use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+
+fn main() {
+    println!("instructions: {}", level().name());
+    divan::main();
+}
+
+fn level() -> SimdLevel {
+    let named = std::env::var("MRT_SIMD").ok();
+    named.map_or(SimdLevel::detect(), |name| {
+        SimdLevel::from_name(&name)
+            .filter(|level| level.is_available())
+            .expect("MRT_SIMD names instructions that this machine has")
+    })
+}
+
+/// Numbers as operators are stored.
+trait Number: Element + std::fmt::Debug {
+    const NAME: &'static str;
+    /// A number of -8 to 8, which every storage has exactly.
+    fn of(small: i8) -> Self;
+}
+
+impl Number for f32 {
+    const NAME: &'static str = "f32";
+    fn of(small: i8) -> f32 {
+        f32::from(small)
+    }
+}
+
+/// `f16` by its bits.
+impl Number for u16 {
+    const NAME: &'static str = "f16";
+    fn of(small: i8) -> u16 {
+        half::f16::from_f32_const(f32::from(small)).to_bits()
+    }
+}
+
+impl Number for i8 {
+    const NAME: &'static str = "i8";
+    fn of(small: i8) -> i8 {
+        small
+    }
+}
+
+/// Numbers of -8 to 8 without a pattern that kernels could share.
+fn small(k: usize) -> i8 {
+    let mixed = (k as u32).wrapping_mul(2_654_435_761) >> 16;
+    (mixed % 17) as i8 - 8
+}
+
+/// Light, which no storage rounds.
+fn light(count: usize) -> Vec<f32> {
+    (0..count).map(|k| 0.1 + 0.01 * (k % 97) as f32).collect()
+}
+
+/// `found` is a sum in `f32` of products whose magnitudes add up to `size`.
+fn check(what: &str, found: f32, exact: f64, size: f64) {
+    let apart = (f64::from(found) - exact).abs();
+    assert!(apart <= 1e-5 * size, "{what}: {found} instead of {exact}");
+}
+
+// ---- Tiles ----
+
+/// Columns of tiles, as they occur: coefficients of one class, of a block, of several blocks.
+const COLUMNS: [usize; 5] = [8, 16, 32, 64, 256];
+
+#[derive(Clone, Copy)]
+enum Tiles {
+    One,
+    Two,
+    Half,
+}
+
+/// Operands of the three kernels of tiles.
+struct TileProduct<E> {
+    tiles: Tiles,
+    panels: [Vec<E>; 2],
+    lists: ColumnLists,
+    x: Vec<f32>,
+    columns: usize,
+}
+
+struct RunTiles<'a, E>(&'a TileProduct<E>, &'a mut [TileSums; 2]);
+
+impl<E: Element> Kernel for RunTiles<'_, E> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) {
+        let (product, sums) = (self.0, self.1);
+        let columns = product.lists.get(0..product.columns);
+        let x = Rgb::new(&product.x, product.columns);
+        let panels = [&product.panels[0][..], &product.panels[1][..]];
+        let one = Term {
+            panels: [panels[0]],
+            columns,
+            x,
+        };
+        match product.tiles {
+            Tiles::One => add_tile(l, std::iter::once(one), &mut sums[0]),
+            Tiles::Half => add_half_tile(l, std::iter::once(one), &mut sums[0]),
+            Tiles::Two => add_two_tiles(l, Term { panels, columns, x }, sums.each_mut()),
+        }
+    }
+}
+
+fn tiles<E: Number>(bencher: Bencher, tiles: Tiles, columns: usize) {
+    let (count, rows) = match tiles {
+        Tiles::One => (1, TILE),
+        Tiles::Two => (2, TILE),
+        Tiles::Half => (1, HALF_TILE),
+    };
+    let number = |panel: usize, k: usize| small(k + 1000 * panel);
+    let panels = [0, 1].map(|panel| {
+        (0..columns * rows)
+            .map(|k| E::of(number(panel, k)))
+            .collect()
+    });
+    let mut lists = ColumnLists::default();
+    lists.push(0..columns as u32);
+    let x = light(CHANNELS * columns);
+    let product = TileProduct {
+        tiles,
+        panels,
+        lists,
+        x,
+        columns,
+    };
+    let mut sums = [[[0.0; TILE]; CHANNELS]; 2];
+    level().run(RunTiles(&product, &mut sums));
+    for (panel, sums) in sums.iter().enumerate().take(count) {
+        for (channel, sums) in sums.iter().enumerate() {
+            for (row, &found) in sums.iter().enumerate().take(rows) {
+                let (mut exact, mut size) = (0.0, 0.0);
+                for k in 0..columns {
+                    let a = f64::from(number(panel, k * rows + row));
+                    let term = a * f64::from(product.x[channel * columns + k]);
+                    exact += term;
+                    size += term.abs();
+                }
+                check(E::NAME, found, exact, size);
+            }
+        }
+    }
+    bencher
+        .counter(ItemsCount::new(count * rows * columns * CHANNELS))
+        .bench_local(|| level_run(RunTiles(black_box(&product), black_box(&mut sums))));
+}
+
+/// [`SimdLevel::run`] with the level read once.
+fn level_run<K: Kernel>(kernel: K) -> K::Output {
+    static LEVEL: std::sync::OnceLock<SimdLevel> = std::sync::OnceLock::new();
+    LEVEL.get_or_init(level).run(kernel)
+}
+
+#[divan::bench(name = "add_tile", types = [f32, u16, i8], args = COLUMNS)]
+fn one_tile<E: Number>(bencher: Bencher, columns: usize) {
+    tiles::<E>(bencher, Tiles::One, columns);
+}
+
+#[divan::bench(name = "add_two_tiles", types = [f32, u16, i8], args = COLUMNS)]
+fn two_tiles<E: Number>(bencher: Bencher, columns: usize) {
+    tiles::<E>(bencher, Tiles::Two, columns);
+}
+
+#[divan::bench(name = "add_half_tile", types = [f32, u16, i8], args = COLUMNS)]
+fn half_tile<E: Number>(bencher: Bencher, columns: usize) {
+    tiles::<E>(bencher, Tiles::Half, columns);
+}
+
+// ---- Rows ----
+
+struct RunDots<'a, E> {
+    rows: &'a [E],
+    x: [&'a [f32]; CHANNELS],
+}
+
+impl<E: Element> Kernel for RunDots<'_, E> {
+    type Output = [[f32; CHANNELS]; DOT_ROWS];
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Self::Output {
+        dot_rows(l, self.rows, self.x)
+    }
+}
+
+/// Lengths are orbits of texels: of a mobile straight, a standard corner, one and a half of a standard straight.
+#[divan::bench(name = "dot_rows", types = [f32, u16, i8], args = [32, 128, 192, 1536])]
+fn dots<E: Number>(bencher: Bencher, length: usize) {
+    let rows: Vec<E> = (0..DOT_ROWS * length).map(|k| E::of(small(k))).collect();
+    let x = light(CHANNELS * length);
+    let channels: [&[f32]; CHANNELS] = std::array::from_fn(|c| &x[c * length..(c + 1) * length]);
+    let (rows, x) = (&rows[..], channels);
+    let found = level_run(RunDots { rows, x });
+    for (row, found) in found.iter().enumerate() {
+        for (channel, &found) in found.iter().enumerate() {
+            let (mut exact, mut size) = (0.0, 0.0);
+            for k in 0..length {
+                let term = f64::from(small(row * length + k)) * f64::from(x[channel][k]);
+                exact += term;
+                size += term.abs();
+            }
+            check(E::NAME, found, exact, size);
+        }
+    }
+    bencher
+        .counter(ItemsCount::new(DOT_ROWS * length * CHANNELS))
+        .bench_local(|| {
+            let rows = black_box(rows);
+            level_run(RunDots { rows, x })
+        });
+}
+
+// ---- Folding ----
+
+/// Three mirrors.
+const GROUP: usize = 8;
+
+/// Orbits, one and a half times those of a standard straight.
+const STRIDE: usize = 192;
+
+/// What element `element` of the group does to class `class`.
+fn sign(element: usize, class: usize) -> f64 {
+    match (element & class).count_ones() % 2 {
+        0 => 1.0,
+        _ => -1.0,
+    }
+}
+
+struct RunFold<'a> {
+    light: Reflected<'a>,
+    weight: &'a [f32],
+    folded: &'a mut [f32],
+}
+
+impl Kernel for RunFold<'_> {
+    type Output = [f32; 2];
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> [f32; 2] {
+        fold::<L, GROUP>(l, self.light, self.weight, self.folded, STRIDE)
+    }
+}
+
+/// With indirect light or without.
+#[divan::bench(name = "fold", args = [false, true])]
+fn folds(bencher: Bencher, with_indirect: bool) {
+    let (direct, albedo) = (light(GROUP * STRIDE), light(GROUP * STRIDE + 5));
+    let weight = vec![1.0; STRIDE];
+    let mut folded = vec![0.0; GROUP * STRIDE];
+    let light = Reflected {
+        direct: &direct,
+        indirect: with_indirect.then_some(&direct[..]),
+        albedo: &albedo[5..],
+        emission: None,
+    };
+    level_run(RunFold {
+        light,
+        weight: &weight,
+        folded: &mut folded,
+    });
+    let times = if with_indirect { 2.0 } else { 1.0 };
+    for class in 0..GROUP {
+        for at in 0..STRIDE {
+            let (mut exact, mut size) = (0.0, 0.0);
+            for element in 0..GROUP {
+                let k = element * STRIDE + at;
+                let sent = times * f64::from(direct[k]) * f64::from(light.albedo[k]);
+                exact += sign(element, class) * sent;
+                size += sent;
+            }
+            check("fold", folded[class * STRIDE + at], exact, size);
+        }
+    }
+    bencher
+        .counter(ItemsCount::new(GROUP * STRIDE))
+        .bench_local(|| {
+            level_run(RunFold {
+                light: black_box(light),
+                weight: &weight,
+                folded: &mut folded,
+            })
+        });
+}
+
+struct RunUnfold<'a> {
+    classes: &'a [TileSums],
+    weight: &'a [f32],
+    signals: [&'a mut [f32]; CHANNELS],
+}
+
+impl Kernel for RunUnfold<'_> {
+    type Output = f32;
+    #[inline(always)]
+    fn run<L: Lanes>(mut self, l: L) -> f32 {
+        let mut found = Unfolded::new(l);
+        let mut first = 0;
+        while first < STRIDE {
+            let classes: [&TileSums; GROUP] = std::array::from_fn(|class| &self.classes[class]);
+            let signals = &mut self.signals;
+            unfold::<L, GROUP, false>(l, classes, first, self.weight, signals, &mut found);
+            first += TILE;
+        }
+        found.sum(l, 0)
+    }
+}
+
+#[divan::bench(name = "unfold")]
+fn unfolds(bencher: Bencher) {
+    let value = |class: usize, channel: usize, row: usize| {
+        f32::from(small(row + TILE * (channel + CHANNELS * class))) / 8.0
+    };
+    let classes: Vec<TileSums> = (0..GROUP)
+        .map(|class| std::array::from_fn(|c| std::array::from_fn(|row| value(class, c, row))))
+        .collect();
+    let weight = vec![1.0; STRIDE];
+    let mut planes = [(); CHANNELS].map(|()| vec![0.0; GROUP * STRIDE]);
+    level_run(RunUnfold {
+        classes: &classes,
+        weight: &weight,
+        signals: planes.each_mut().map(|plane| &mut plane[..]),
+    });
+    for (channel, plane) in planes.iter().enumerate() {
+        for (k, &found) in plane.iter().enumerate() {
+            let (element, row) = (k / STRIDE, k % STRIDE % TILE);
+            let terms = (0..GROUP)
+                .map(|class| sign(element, class) * f64::from(value(class, channel, row)));
+            check("unfold", found, terms.sum::<f64>().max(0.0), 8.0);
+        }
+    }
+    bencher
+        .counter(ItemsCount::new(CHANNELS * GROUP * STRIDE))
+        .bench_local(|| {
+            level_run(RunUnfold {
+                classes: black_box(&classes),
+                weight: &weight,
+                signals: planes.each_mut().map(|plane| &mut plane[..]),
+            })
+        });
+}
+
+// ---- Dense products ----
+
+/// Rows, inner size, columns: folded and whole operators of a standard block, on one block and on 41.
+const SIZES: [Size; 6] = [
+    Size([32, 192, 3]),
+    Size([192, 8, 3]),
+    Size([32, 1536, 3]),
+    Size([32, 1536, 123]),
+    Size([1536, 32, 3]),
+    Size([1536, 32, 123]),
+];
+
+#[derive(Clone, Copy)]
+struct Size([usize; 3]);
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let [m, k, n] = self.0;
+        write!(f, "{m} x {k} x {n}")
+    }
+}
+
+/// `out = a b`, all column-major; times `run` after a look at its answer.
+fn dense(bencher: Bencher, Size([m, k, n]): Size, run: impl Fn(&[f32], &[f32], &mut [f32])) {
+    let a: Vec<f32> = (0..m * k).map(|at| f32::from(small(at))).collect();
+    let b = light(k * n);
+    let mut out = vec![0.0; m * n];
+    run(&a, &b, &mut out);
+    for column in 0..n {
+        for row in 0..m {
+            let (mut exact, mut size) = (0.0, 0.0);
+            for inner in 0..k {
+                let term = f64::from(a[inner * m + row]) * f64::from(b[column * k + inner]);
+                exact += term;
+                size += term.abs();
+            }
+            check("product", out[column * m + row], exact, size);
+        }
+    }
+    bencher
+        .counter(ItemsCount::new(m * k * n))
+        .bench_local(|| run(black_box(&a), black_box(&b), black_box(&mut out)));
+}
+
+/// All tiles of a matrix, two at a time, for each triple of columns.
+struct TiledProduct<'a> {
+    panels: &'a [f32],
+    lists: &'a ColumnLists,
+    size: [usize; 3],
+    b: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl Kernel for TiledProduct<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) {
+        let [m, k, n] = self.size;
+        let panel = |tile: usize| &self.panels[tile * TILE * k..(tile + 1) * TILE * k];
+        let columns = self.lists.get(0..k);
+        let mut first = 0;
+        while first < n {
+            let x = Rgb::new(&self.b[first * k..(first + CHANNELS) * k], k);
+            let mut row = 0;
+            while row < m {
+                let mut sums = [[[0.0; TILE]; CHANNELS]; 2];
+                let tile = row / TILE;
+                let panels = [panel(tile), panel(tile + 1)];
+                add_two_tiles(l, Term { panels, columns, x }, sums.each_mut());
+                for (tile, sums) in sums.iter().enumerate() {
+                    for (channel, sums) in sums.iter().enumerate() {
+                        let at = (first + channel) * m + row + tile * TILE;
+                        self.out[at..at + TILE].copy_from_slice(sums);
+                    }
+                }
+                row += 2 * TILE;
+            }
+            first += CHANNELS;
+        }
+    }
+}
+
+/// The kernels of tiles, on a matrix that was packed beforehand.
+#[divan::bench(args = SIZES)]
+fn product_tiles(bencher: Bencher, size: Size) {
+    let Size([m, k, _]) = size;
+    // As `dense` has it: rows of a tile next to each other.
+    let number = |at: usize| {
+        let (tile, column, row) = (at / (TILE * k), at / TILE % k, at % TILE);
+        f32::from(small(column * m + tile * TILE + row))
+    };
+    let panels: Vec<f32> = (0..m * k).map(number).collect();
+    let mut lists = ColumnLists::default();
+    lists.push(0..k as u32);
+    dense(bencher, size, |_, b, out| {
+        level_run(TiledProduct {
+            panels: black_box(&panels),
+            lists: &lists,
+            size: size.0,
+            b,
+            out,
+        });
+    });
+}
+
+/// All rows of a matrix, [`DOT_ROWS`] at a time, for each triple of columns.
+struct DotProduct<'a> {
+    rows: &'a [f32],
+    size: [usize; 3],
+    b: &'a [f32],
+    out: &'a mut [f32],
+}
+
+impl Kernel for DotProduct<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) {
+        let [m, k, n] = self.size;
+        let mut first = 0;
+        while first < n {
+            let column = |c: usize| &self.b[(first + c) * k..(first + c + 1) * k];
+            let x = [column(0), column(1), column(2)];
+            let mut row = 0;
+            while row < m {
+                let sums = dot_rows(l, &self.rows[row * k..(row + DOT_ROWS) * k], x);
+                for (at, sums) in sums.iter().enumerate() {
+                    for (channel, &sum) in sums.iter().enumerate() {
+                        self.out[(first + channel) * m + row + at] = sum;
+                    }
+                }
+                row += DOT_ROWS;
+            }
+            first += CHANNELS;
+        }
+    }
+}
+
+/// The kernel of rows, on a matrix that was packed beforehand; lengths that it does not take are left out.
+#[divan::bench(args = SIZES.into_iter().filter(|size| size.0[1].is_multiple_of(mrt_core::simd::WIDEST)))]
+fn product_rows(bencher: Bencher, size: Size) {
+    let Size([m, k, _]) = size;
+    let rows: Vec<f32> = (0..m * k)
+        .map(|at| f32::from(small(at % k * m + at / k)))
+        .collect();
+    dense(bencher, size, |_, b, out| {
+        level_run(DotProduct {
+            rows: black_box(&rows),
+            size: size.0,
+            b,
+            out,
+        });
+    });
+}
+
+#[divan::bench(args = SIZES)]
+#[allow(unsafe_code, reason = "the library takes pointers")]
+fn product_gemm(bencher: Bencher, size: Size) {
+    let Size([m, k, n]) = size;
+    dense(bencher, size, |a, b, out| {
+        assert_eq!([a.len(), b.len(), out.len()], [m * k, k * n, m * n]);
+        // SAFETY: the slices hold m x k, k x n and m x n numbers, and the strides stay inside them.
+        unsafe {
+            gemm::gemm(
+                m,
+                n,
+                k,
+                out.as_mut_ptr(),
+                m as isize,
+                1,
+                false,
+                a.as_ptr(),
+                m as isize,
+                1,
+                b.as_ptr(),
+                k as isize,
+                1,
+                0.0,
+                1.0,
+                false,
+                false,
+                false,
+                gemm::Parallelism::None,
+            );
+        }
+    });
+}
+
+#[divan::bench(args = SIZES)]
+#[allow(unsafe_code, reason = "the library takes pointers")]
+fn product_matrixmultiply(bencher: Bencher, size: Size) {
+    let Size([m, k, n]) = size;
+    dense(bencher, size, |a, b, out| {
+        assert_eq!([a.len(), b.len(), out.len()], [m * k, k * n, m * n]);
+        // SAFETY: as above.
+        unsafe {
+            matrixmultiply::sgemm(
+                m,
+                k,
+                n,
+                1.0,
+                a.as_ptr(),
+                1,
+                m as isize,
+                b.as_ptr(),
+                1,
+                k as isize,
+                0.0,
+                out.as_mut_ptr(),
+                1,
+                m as isize,
+            );
+        }
+    });
+}
+
+#[cfg(feature = "faer")]
+#[divan::bench(args = SIZES)]
+fn product_faer(bencher: Bencher, size: Size) {
+    use faer::{Accum, MatMut, MatRef, Par, linalg::matmul::matmul};
+    let Size([m, k, n]) = size;
+    dense(bencher, size, |a, b, out| {
+        let a = MatRef::from_column_major_slice(a, m, k);
+        let b = MatRef::from_column_major_slice(b, k, n);
+        let out = MatMut::from_column_major_slice_mut(out, m, n);
+        matmul(out, Accum::Replace, a, b, 1.0, Par::Seq);
+    });
+}
