@@ -206,126 +206,128 @@ pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [Ti
     }
 }
 
-/// A matrix of many tiles times three vectors: tile after tile, all with the same columns. `out` has as many numbers a
-/// channel as the matrix has rows.
+/// A matrix of many tiles, all with the same columns, times the three vectors of one block or of two. Each `out` has as
+/// many numbers a channel as the matrix has rows. Sums are taken column by column, so that two blocks at once, which
+/// need the matrix loaded once, get the same bits as one after the other.
 ///
 /// # Panics
-/// If the rows are not whole tiles, there are not as many numbers as columns times rows, or `x` is shorter than any of
-/// the lists of columns allows.
+/// If the rows are not whole tiles, there are not as many numbers as columns times rows, or an `x` is shorter than any
+/// of the lists of columns allows.
 #[inline(always)]
-pub fn multiply_tiles<L: Lanes, E: Element>(
+pub fn multiply_tiles<L: Lanes, E: Element, const BLOCKS: usize>(
     l: L,
     tiles: &[E],
     columns: Columns<'_>,
-    x: Rgb<'_>,
-    out: TileOut<'_>,
+    x: [Rgb<'_>; BLOCKS],
+    mut out: [TileOut<'_>; BLOCKS],
 ) {
     let size = TILE * columns.indices.len();
-    let rows = out[0].len();
+    let rows = out[0][0].len();
     assert!(rows.is_multiple_of(TILE) && tiles.len() == rows / TILE * size);
-    assert!(out.iter().all(|channel| channel.len() == rows));
-    assert!(x.has(columns.limit));
-    let [red, green, blue] = out;
+    for (x, out) in x.iter().zip(&out) {
+        assert!(x.has(columns.limit));
+        assert!(out.iter().all(|channel| channel.len() == rows));
+    }
     let mut row = 0;
     while row < rows {
-        // SAFETY: row + TILE <= rows, the length of each channel, so the panel ends within the tiles. Where there is
-        // room for a second tile, that holds for it too.
+        let start = row / TILE * size;
+        // SAFETY: row + TILE <= rows, the length of each channel, and the tile ends within the tiles; where there are two
+        // tiles left, that holds for the second too.
         unsafe {
-            let panel = |row: usize| {
-                let start = row / TILE * size;
-                tiles.get_unchecked(start..start + size)
-            };
-            let end = row + 2 * TILE;
-            if (L::N == 8 || L::N == 16) && end <= rows {
-                let panels = [panel(row), panel(row + TILE)];
-                let (r0, r1) = red.get_unchecked_mut(row..end).split_at_mut_unchecked(TILE);
-                let (g0, g1) = green
-                    .get_unchecked_mut(row..end)
-                    .split_at_mut_unchecked(TILE);
-                let (b0, b1) = blue
-                    .get_unchecked_mut(row..end)
-                    .split_at_mut_unchecked(TILE);
-                let out = [[r0, g0, b0], [r1, g1, b1]];
-                if L::N == 8 {
-                    multiply_panels::<L, E, 2, 2, 1>(l, panels, columns, x, out);
-                } else {
-                    multiply_panels::<L, E, 2, 1, 2>(l, panels, columns, x, out);
+            let here = tiles.get_unchecked(start..start + size);
+            let two = row + 2 * TILE <= rows;
+            match (L::N, BLOCKS) {
+                (8, 1) if two => {
+                    let panels = [here, tiles.get_unchecked(start + size..start + 2 * size)];
+                    multiply_panels::<L, E, 2, 2, BLOCKS>(l, panels, columns, x, &mut out, row);
+                    row += TILE;
                 }
-                row = end;
-                continue;
-            }
-            let end = row + TILE;
-            let out = [
-                red.get_unchecked_mut(row..end),
-                green.get_unchecked_mut(row..end),
-                blue.get_unchecked_mut(row..end),
-            ];
-            match L::N {
-                4 => multiply_panels::<L, E, 1, 4, 1>(l, [panel(row)], columns, x, [out]),
-                8 => multiply_panels::<L, E, 1, 2, 2>(l, [panel(row)], columns, x, [out]),
-                16 => multiply_panels::<L, E, 1, 1, 4>(l, [panel(row)], columns, x, [out]),
+                (16, _) if two => {
+                    let panels = [here, tiles.get_unchecked(start + size..start + 2 * size)];
+                    multiply_panels::<L, E, 2, 1, BLOCKS>(l, panels, columns, x, &mut out, row);
+                    row += TILE;
+                }
+                (8, _) => {
+                    multiply_panels::<L, E, 1, 2, BLOCKS>(l, [here], columns, x, &mut out, row);
+                }
+                (16, _) => {
+                    multiply_panels::<L, E, 1, 1, BLOCKS>(l, [here], columns, x, &mut out, row);
+                }
+                (4, _) => {
+                    // Four lanes have no registers for two blocks.
+                    for (x, out) in x.iter().zip(&mut out) {
+                        let (x, out) = ([*x], std::slice::from_mut(out));
+                        multiply_panels::<L, E, 1, 4, 1>(l, [here], columns, x, out, row);
+                    }
+                }
                 _ => {
-                    let term = Term {
-                        panels: [panel(row)],
-                        columns,
-                        x,
-                        scales: &[],
-                    };
-                    sum_rows_one_by_one::<L, E, TILE>(l, std::iter::once(term), out);
+                    for (x, [red, green, blue]) in x.iter().zip(&mut out) {
+                        let term = Term {
+                            panels: [here],
+                            columns,
+                            x: *x,
+                            scales: &[],
+                        };
+                        let out = [&mut red[row..], &mut green[row..], &mut blue[row..]];
+                        sum_rows_one_by_one::<L, E, TILE>(l, std::iter::once(term), out);
+                    }
                 }
             }
-            row = end;
         }
+        row += TILE;
     }
 }
 
-/// One tile of each panel.
+/// One tile of each panel, the first from row `row` of `out` on.
 ///
 /// # Safety
-/// Each panel has a tile of numbers for each column, `x` three numbers for each, `out` a tile a channel and panel, and
-/// `VECTORS` vectors make a tile.
+/// Each panel has a tile of numbers for each column, each `x` three numbers for each, each channel of `out` a tile for each
+/// panel from `row` on, and `VECTORS` vectors make a tile.
 #[inline(always)]
 unsafe fn multiply_panels<
     L: Lanes,
     E: Element,
     const PANELS: usize,
     const VECTORS: usize,
-    const SETS: usize,
+    const BLOCKS: usize,
 >(
     l: L,
     panels: [&[E]; PANELS],
     columns: Columns<'_>,
-    x: Rgb<'_>,
-    out: [TileOut<'_>; PANELS],
+    x: [Rgb<'_>; BLOCKS],
+    out: &mut [TileOut<'_>],
+    row: usize,
 ) {
-    let count = columns.indices.len();
-    let mut acc = [[[[l.splat(0.0); VECTORS]; CHANNELS]; PANELS]; SETS];
-    let mut k = 0;
-    while k + SETS <= count {
-        for (set, acc) in acc.iter_mut().enumerate() {
-            // SAFETY: k + set < count, and the caller's promises.
-            unsafe {
-                add_column::<L, E, PANELS, VECTORS, TILE>(l, panels, columns, k + set, x, 1.0, acc);
+    let mut acc = [[[[l.splat(0.0); VECTORS]; PANELS]; CHANNELS]; BLOCKS];
+    for k in 0..columns.indices.len() {
+        // SAFETY, of the whole loop: the caller's promises.
+        let column = unsafe { *columns.indices.get_unchecked(k) } as usize;
+        let mut a = [[l.splat(0.0); VECTORS]; PANELS];
+        for (a, panel) in a.iter_mut().zip(&panels) {
+            for (v, a) in a.iter_mut().enumerate() {
+                let at = k * TILE + v * L::N;
+                *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
             }
         }
-        k += SETS;
-    }
-    while k < count {
-        // SAFETY: as above.
-        unsafe {
-            add_column::<L, E, PANELS, VECTORS, TILE>(l, panels, columns, k, x, 1.0, &mut acc[0]);
-        }
-        k += 1;
-    }
-    for (panel, out) in out.into_iter().enumerate() {
-        for (channel, out) in out.into_iter().enumerate() {
-            for v in 0..VECTORS {
-                let mut sum = acc[0][panel][channel][v];
-                for other in &acc[1..] {
-                    sum = l.add(sum, other[panel][channel][v]);
+        for (acc, x) in acc.iter_mut().zip(&x) {
+            for (channel, acc) in acc.iter_mut().enumerate() {
+                let x = unsafe { *x.values.get_unchecked(channel * x.stride + column) };
+                let x = l.splat(x);
+                for (acc, a) in acc.iter_mut().zip(&a) {
+                    for (acc, &a) in acc.iter_mut().zip(a) {
+                        *acc = l.mul_add(a, x, *acc);
+                    }
                 }
-                // SAFETY: the caller's promises.
-                unsafe { l.store_unchecked(out, v * L::N, sum) };
+            }
+        }
+    }
+    for (acc, out) in acc.iter().zip(out) {
+        for (acc, out) in acc.iter().zip(out.iter_mut()) {
+            for (panel, acc) in acc.iter().enumerate() {
+                for (v, &acc) in acc.iter().enumerate() {
+                    // SAFETY: the caller's promises.
+                    unsafe { l.store_unchecked(out, row + panel * TILE + v * L::N, acc) };
+                }
             }
         }
     }

@@ -13,7 +13,7 @@ use std::ops::Range;
 /// What kernels of one task write on the way.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// A block's radiosity by class, in that by channel.
+    /// A block's radiosity by class, in that by channel; or the irradiance of two.
     folded: Vec<f32>,
     /// Coefficients times scales.
     scaled: Vec<f32>,
@@ -23,8 +23,8 @@ impl Scratch {
     /// For blocks of so many slots, and so many coefficients a channel.
     pub(super) fn new(slots: usize, coefficients: usize) -> Self {
         Self {
-            folded: vec![0.0; CHANNELS * slots],
-            scaled: vec![0.0; CHANNELS * coefficients],
+            folded: vec![0.0; 2 * CHANNELS * slots],
+            scaled: vec![0.0; 2 * CHANNELS * coefficients],
         }
     }
 }
@@ -139,15 +139,15 @@ pub(super) struct ResponsesOf<'a> {
     pub joint: &'a mut [f32],
 }
 
-/// Irradiance of one block from its joint coefficients.
-pub(super) struct IndirectOf<'a> {
+/// Irradiance of one block, or of two of one shape, from their joint coefficients.
+pub(super) struct IndirectOf<'a, const BLOCKS: usize> {
     pub shape: &'a PackedShape,
-    pub joint: &'a [f32],
+    pub joint: [&'a [f32]; BLOCKS],
     pub scratch: &'a mut Scratch,
     /// Whether to find the largest change and irradiance; without, only whether there is light is known.
     pub compare: bool,
     /// Irradiance; what was there before is replaced.
-    pub indirect: [&'a mut [f32]; CHANNELS],
+    pub indirect: [[&'a mut [f32]; CHANNELS]; BLOCKS],
 }
 
 /// What arrived at a block's walls.
@@ -174,24 +174,24 @@ impl Kernel for ResponsesOf<'_> {
     }
 }
 
-impl Kernel for IndirectOf<'_> {
-    type Output = Arrived;
+impl<const BLOCKS: usize> Kernel for IndirectOf<'_, BLOCKS> {
+    type Output = [Arrived; BLOCKS];
 
     #[inline(always)]
-    fn run<L: Lanes>(mut self, l: L) -> Arrived {
+    fn run<L: Lanes>(mut self, l: L) -> [Arrived; BLOCKS] {
         match (&self.shape.joint, self.shape.folding.mirrors) {
-            (Values::F32(joint), 0) => expand::<L, f32, 1>(l, joint, &mut self),
-            (Values::F32(joint), 1) => expand::<L, f32, 2>(l, joint, &mut self),
-            (Values::F32(joint), 2) => expand::<L, f32, 4>(l, joint, &mut self),
-            (Values::F32(joint), _) => expand::<L, f32, 8>(l, joint, &mut self),
-            (Values::F16(joint), 0) => expand::<L, u16, 1>(l, joint, &mut self),
-            (Values::F16(joint), 1) => expand::<L, u16, 2>(l, joint, &mut self),
-            (Values::F16(joint), 2) => expand::<L, u16, 4>(l, joint, &mut self),
-            (Values::F16(joint), _) => expand::<L, u16, 8>(l, joint, &mut self),
-            (Values::Int8(joint), 0) => expand::<L, i8, 1>(l, joint, &mut self),
-            (Values::Int8(joint), 1) => expand::<L, i8, 2>(l, joint, &mut self),
-            (Values::Int8(joint), 2) => expand::<L, i8, 4>(l, joint, &mut self),
-            (Values::Int8(joint), _) => expand::<L, i8, 8>(l, joint, &mut self),
+            (Values::F32(joint), 0) => expand::<L, f32, 1, BLOCKS>(l, joint, &mut self),
+            (Values::F32(joint), 1) => expand::<L, f32, 2, BLOCKS>(l, joint, &mut self),
+            (Values::F32(joint), 2) => expand::<L, f32, 4, BLOCKS>(l, joint, &mut self),
+            (Values::F32(joint), _) => expand::<L, f32, 8, BLOCKS>(l, joint, &mut self),
+            (Values::F16(joint), 0) => expand::<L, u16, 1, BLOCKS>(l, joint, &mut self),
+            (Values::F16(joint), 1) => expand::<L, u16, 2, BLOCKS>(l, joint, &mut self),
+            (Values::F16(joint), 2) => expand::<L, u16, 4, BLOCKS>(l, joint, &mut self),
+            (Values::F16(joint), _) => expand::<L, u16, 8, BLOCKS>(l, joint, &mut self),
+            (Values::Int8(joint), 0) => expand::<L, i8, 1, BLOCKS>(l, joint, &mut self),
+            (Values::Int8(joint), 1) => expand::<L, i8, 2, BLOCKS>(l, joint, &mut self),
+            (Values::Int8(joint), 2) => expand::<L, i8, 4, BLOCKS>(l, joint, &mut self),
+            (Values::Int8(joint), _) => expand::<L, i8, 8, BLOCKS>(l, joint, &mut self),
         }
     }
 }
@@ -328,70 +328,92 @@ fn sum_terms<'a, L: Lanes, E: Element>(
 }
 
 #[inline(always)]
-fn expand<L: Lanes, E: Element, const GROUP: usize>(
+fn expand<L: Lanes, E: Element, const GROUP: usize, const BLOCKS: usize>(
     l: L,
     joint: &[E],
-    block: &mut IndirectOf<'_>,
-) -> Arrived {
-    let shape = block.shape;
+    blocks: &mut IndirectOf<'_, BLOCKS>,
+) -> [Arrived; BLOCKS] {
+    let shape = blocks.shape;
     let stride = shape.folding.stride;
-    let Scratch { folded, scaled } = &mut *block.scratch;
-    let x = scaled_joint(shape, block.joint, scaled);
-    let x = Rgb::new(x, x.len() / CHANNELS);
     let weight = &shape.folding.weight[..];
-    let folded = &mut folded[..GROUP * CHANNELS * stride];
-    let mut start = 0;
-    for (class, folded) in folded.chunks_exact_mut(CHANNELS * stride).enumerate() {
-        let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
-        let (red, rest) = folded.split_at_mut(stride);
-        let (green, blue) = rest.split_at_mut(stride);
-        let size = stride * columns.indices().len();
-        let end = start + size;
-        let tiles = &joint[std::mem::replace(&mut start, end)..end];
-        multiply_tiles(l, tiles, columns, x, [red, green, blue]);
+    let place = blocks.joint[0].len();
+    let mut x = blocks.joint;
+    if !shape.joint_scales.is_empty() {
+        let scaled = blocks.scratch.scaled.chunks_exact_mut(place);
+        for (x, scaled) in x.iter_mut().zip(scaled) {
+            scale_joint(&shape.joint_scales, x, scaled);
+            *x = scaled;
+        }
     }
-    let mut found = Unfolded::new(l);
-    let mut flux = [0.0; CHANNELS];
-    for (channel, flux) in flux.iter_mut().enumerate() {
-        let (folded, apart) = (&folded[channel * stride..], CHANNELS * stride);
-        let out = &mut *block.indirect[channel];
-        *flux = if block.compare {
-            unfold::<L, GROUP, true>(l, folded, apart, weight, out, &mut found)
+    let mut coefficients = [Rgb::new(x[0], place / CHANNELS); BLOCKS];
+    for (coefficients, x) in coefficients.iter_mut().zip(x) {
+        *coefficients = Rgb::new(x, place / CHANNELS);
+    }
+    let mut start = 0;
+    for class in 0..GROUP {
+        let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
+        let end = start + stride * columns.indices().len();
+        let tiles = &joint[std::mem::replace(&mut start, end)..end];
+        // Of each block all classes lie side by side, so that it unfolds from what it last wrote.
+        let half = GROUP * CHANNELS * stride;
+        let (first, second) = blocks.scratch.folded.split_at_mut(half);
+        let at = class * CHANNELS * stride..(class + 1) * CHANNELS * stride;
+        let first = channels(&mut first[at.clone()], stride);
+        if BLOCKS == 2 {
+            let second = channels(&mut second[at], stride);
+            let x = [coefficients[0], coefficients[1]];
+            multiply_tiles(l, tiles, columns, x, [first, second]);
         } else {
-            unfold::<L, GROUP, false>(l, folded, apart, weight, out, &mut found)
+            multiply_tiles(l, tiles, columns, [coefficients[0]], [first]);
+        }
+    }
+    let mut arrived = [Arrived::default(); BLOCKS];
+    for (block, arrived) in arrived.iter_mut().enumerate() {
+        let folded = &blocks.scratch.folded[block * GROUP * CHANNELS * stride..];
+        let mut found = Unfolded::new(l);
+        let mut flux = [0.0; CHANNELS];
+        for (channel, flux) in flux.iter_mut().enumerate() {
+            let (folded, apart) = (&folded[channel * stride..], CHANNELS * stride);
+            let out = &mut *blocks.indirect[block][channel];
+            *flux = if blocks.compare {
+                unfold::<L, GROUP, true>(l, folded, apart, weight, out, &mut found)
+            } else {
+                unfold::<L, GROUP, false>(l, folded, apart, weight, out, &mut found)
+            };
+        }
+        let [change, peak] = if blocks.compare {
+            found.change_and_peak(l)
+        } else {
+            // Nobody asks but whether there is light.
+            [0.0, flux[0].max(flux[1]).max(flux[2])]
+        };
+        *arrived = Arrived {
+            flux: [f64::from(flux[0]), f64::from(flux[1]), f64::from(flux[2])],
+            change,
+            peak,
         };
     }
-    let [change, peak] = if block.compare {
-        found.change_and_peak(l)
-    } else {
-        // Nobody asks but whether there is light.
-        [0.0, flux[0].max(flux[1]).max(flux[2])]
-    };
-    Arrived {
-        flux: flux.map(f64::from),
-        change,
-        peak,
-    }
+    arrived
 }
 
-/// Joint coefficients times the scales of a packed basis.
+/// Red, green and blue of numbers that lie channel by channel.
 #[inline(always)]
-pub(super) fn scaled_joint<'a>(
-    shape: &PackedShape,
-    joint: &'a [f32],
-    scaled: &'a mut [f32],
-) -> &'a [f32] {
-    if shape.joint_scales.is_empty() {
-        return joint;
-    }
+fn channels(all: &mut [f32], stride: usize) -> [&mut [f32]; CHANNELS] {
+    let (red, rest) = all.split_at_mut(stride);
+    let (green, blue) = rest.split_at_mut(stride);
+    [red, green, blue]
+}
+
+/// Joint coefficients times the scales of a packed basis, by mode.
+#[inline(always)]
+fn scale_joint(scales: &[f32], joint: &[f32], scaled: &mut [f32]) {
     let place = joint.len() / CHANNELS;
     for channel in 0..CHANNELS {
-        for (mode, scale) in shape.joint_scales.iter().enumerate() {
+        for (mode, scale) in scales.iter().enumerate() {
             let at = channel * place + mode;
             scaled[at] = joint[at] * scale;
         }
     }
-    &scaled[..joint.len()]
 }
 
 /// A tiled basis times joint coefficients: row after row, channel by channel.
@@ -426,13 +448,7 @@ fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
     let count = columns.indices().len();
     let mut x = job.joint;
     if !basis.scales.is_empty() {
-        let place = x.len() / CHANNELS;
-        for channel in 0..CHANNELS {
-            for (mode, scale) in basis.scales.iter().enumerate() {
-                let at = channel * place + mode;
-                job.scratch.scaled[at] = x[at] * scale;
-            }
-        }
+        scale_joint(&basis.scales, x, &mut job.scratch.scaled);
         x = &job.scratch.scaled[..x.len()];
     }
     let mut row = 0;

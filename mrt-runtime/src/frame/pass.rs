@@ -302,21 +302,49 @@ impl Frame {
             let first = span(list).start;
             let first_slot = layout.slots[first].start;
             let [red, green, blue] = planes;
-            for &block in list {
+            let mut rest = list;
+            while let Some((&block, after)) = rest.split_first() {
                 let place = block as usize;
-                let slots = layout.slots[place].clone();
-                let slots = slots.start - first_slot..slots.end - first_slot;
-                state[place - first].arrives = level.run(IndirectOf {
-                    shape: &scene.shapes[layout.shapes[place] as usize],
-                    joint: &joint[place * size..(place + 1) * size],
+                let shape = layout.shapes[place];
+                // Two blocks of one shape read its basis once.
+                let other = after.first().map(|&next| next as usize);
+                let other = other.filter(|&next| layout.shapes[next] == shape);
+                rest = &after[usize::from(other.is_some())..];
+                let shape = &scene.shapes[shape as usize];
+                let joint = |place: usize| &joint[place * size..(place + 1) * size];
+                let slots = |place: usize| {
+                    let slots = layout.slots[place].clone();
+                    slots.start - first_slot..slots.end - first_slot
+                };
+                let Some(other) = other else {
+                    let out = [&mut *red, &mut *green, &mut *blue];
+                    let [arrives] = level.run(IndirectOf {
+                        shape,
+                        joint: [joint(place)],
+                        scratch,
+                        compare,
+                        indirect: [out.map(|channel| &mut channel[slots(place)])],
+                    });
+                    state[place - first].arrives = arrives;
+                    continue;
+                };
+                let (here, there) = (slots(place), slots(other));
+                let (r0, r1) = red.split_at_mut(there.start);
+                let (g0, g1) = green.split_at_mut(there.start);
+                let (b0, b1) = blue.split_at_mut(there.start);
+                let count = there.len();
+                let arrives = level.run(IndirectOf {
+                    shape,
+                    joint: [joint(place), joint(other)],
                     scratch,
                     compare,
                     indirect: [
-                        &mut red[slots.clone()],
-                        &mut green[slots.clone()],
-                        &mut blue[slots],
+                        [&mut r0[here.clone()], &mut g0[here.clone()], &mut b0[here]],
+                        [&mut r1[..count], &mut g1[..count], &mut b1[..count]],
                     ],
                 });
+                state[place - first].arrives = arrives[0];
+                state[other - first].arrives = arrives[1];
             }
         });
     }
