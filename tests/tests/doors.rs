@@ -26,6 +26,8 @@ fn assembled(level: &Level, coupling: Coupling) -> Scene {
     let config = AssembleConfig {
         coupling,
         transport_storage: Storage::F32,
+        // What is left out depends on what passes a door together.
+        negligible: 0.0,
         ..AssembleConfig::default()
     };
     assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")
