@@ -20,6 +20,8 @@ pub(super) struct Blocks {
     pub targets: Vec<u32>,
     /// Blocks whose indirect light is not up to date, oldest first.
     pub waiting: VecDeque<u32>,
+    /// The most flux that left all walls in a pass since none waited.
+    pub most_sent: Flux,
     /// Blocks whose indirect light was written since outputs were.
     pub changed: Vec<u32>,
     /// Tiles of the lightmap that show them.
@@ -65,6 +67,7 @@ impl Blocks {
             sources: Vec::with_capacity(count),
             targets: Vec::with_capacity(count),
             waiting: VecDeque::with_capacity(count),
+            most_sent: [0.0; 3],
             changed: Vec::with_capacity(count),
             tiles: Vec::with_capacity(tiles),
             doors_moved: true,
@@ -80,6 +83,7 @@ impl Blocks {
         self.lit = 0;
         self.alive.clear();
         self.waiting.clear();
+        self.most_sent = [0.0; 3];
         self.changed.clear();
         self.doors_moved = true;
         self.all_stale = true;

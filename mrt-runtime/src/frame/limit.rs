@@ -8,11 +8,20 @@ use crate::scene::{Planes, Scene};
 /// light, and without it exact operators would be scaled, and lights not add up.
 const SPOT_GAIN: f64 = 0.05;
 
+/// What arrived may be this many times the most that left, while blocks wait: a lamp that moves lights its old place and
+/// its new one, until both are up to date.
+const WAITING_GAIN: f64 = 2.0;
+
 /// Scales a channel down where more flux would arrive on all walls than left them.
 ///
 /// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
 /// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
 /// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
+///
+/// While blocks wait for their light ([`FrameConfig::slice`](super::FrameConfig)), what arrived is partly of earlier
+/// frames, and more than leaves now may be right. [`WAITING_GAIN`] times the most that left since nothing waited is then
+/// the limit.
+///
 /// Returns how many channels were scaled.
 pub(super) fn limit_flux(
     scene: &Scene,
@@ -30,6 +39,13 @@ pub(super) fn limit_flux(
             let state = &blocks.state[block as usize];
             sent += state.sent[channel] + SPOT_GAIN * state.fresh[channel];
             arrived += state.arrived[channel];
+        }
+        let most = &mut blocks.most_sent[channel];
+        if blocks.waiting.is_empty() {
+            *most = sent;
+        } else {
+            *most = most.max(sent);
+            sent = *most * WAITING_GAIN;
         }
         if arrived <= sent {
             continue;
