@@ -211,8 +211,8 @@ fn dots<E: Number>(bencher: Bencher, length: usize) {
     for (row, found) in found.iter().enumerate() {
         for (channel, &found) in found.iter().enumerate() {
             let (mut exact, mut size) = (0.0, 0.0);
-            for k in 0..length {
-                let term = f64::from(small(row * length + k)) * f64::from(x[channel][k]);
+            for (k, &x) in x[channel].iter().enumerate() {
+                let term = f64::from(small(row * length + k)) * f64::from(x);
                 exact += term;
                 size += term.abs();
             }
