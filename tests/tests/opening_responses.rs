@@ -3,10 +3,14 @@
 use glam::Vec3;
 use mrt_core::container::ByteBudget;
 use mrt_core::matrix::{MatrixView, multiply, multiply_add};
+use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
 use mrt_runtime::dictionary::Dictionary;
+use mrt_runtime::frame::{Bounces, Frame};
+use mrt_runtime::light::Light;
 use mrt_runtime::maze::maze;
 use mrt_runtime::opening_responses::responses_by_opening;
+use mrt_runtime::visibility::Openings;
 
 #[test]
 fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
@@ -17,15 +21,23 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
     for coupling in [Coupling::Table, Coupling::Lightfield] {
         let config = AssembleConfig {
             coupling,
+            transport_storage: Storage::F32,
+            negligible: 0.0,
             ..AssembleConfig::default()
         };
         let scene = assemble(&level, &dictionary, &config).expect("a maze is a level");
-        let b: Vec<f32> = (0..3 * scene.coefficient_count)
-            .map(|k| (k % 17) as f32 - 8.0)
-            .collect();
-        let mut expected = vec![0.0; 3 * scene.joint_count];
-        scene.transport.multiply(&b, &scene.doors, &mut expected);
-        let mut found = vec![0.0; expected.len()];
+        let light = Light::Sphere {
+            position: level.blocks[4].warp.center().as_vec3(),
+            radius: 0.1,
+            intensity: Vec3::new(1.0, 0.5, 0.2),
+        };
+        let mut frame = Frame::new(&scene);
+        frame
+            .solve(&scene, &[light], &Openings, Bounces::Count(1))
+            .expect("the light is in a block");
+        let (b, expected) = (frame.coefficients(), frame.indirect());
+        let joint_count = scene.blocks.last().map_or(0, |block| block.joint.end);
+        let mut joint = vec![0.0; 3 * joint_count];
         let all =
             responses_by_opening(&level, &scene, &dictionary, &config).expect("it is the scene");
         for arrival in &all {
@@ -38,13 +50,29 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
             multiply_add(
                 opening.joint_from_response[usize::from(arrival.exchanged)].view(),
                 responses.view(),
-                &mut found[3 * target.joint.start..3 * target.joint.end],
+                &mut joint[3 * target.joint.start..3 * target.joint.end],
             );
+        }
+        let mut found = vec![0.0; expected.len()];
+        for block in &scene.blocks {
+            let own = &b[3 * block.coefficients.start..3 * block.coefficients.end];
+            let joint = &mut joint[3 * block.joint.start..3 * block.joint.end];
+            for channel in 0..3 {
+                let (modes, stride) = (block.coefficients.len(), block.joint.len());
+                for k in 0..modes {
+                    joint[channel * stride + k] += own[channel * modes + k];
+                }
+            }
+            let entry = dictionary.shape_index(block.shape).expect("it is used");
+            let joint = MatrixView::new(block.joint.len(), 3, joint);
+            let out = &mut found[3 * block.texels.start..3 * block.texels.end];
+            multiply_add(dictionary.shapes[entry].joint_basis.view(), joint, out);
         }
         let largest = expected.iter().fold(0.0f32, |m, x| m.max(x.abs()));
         assert!(largest > 0.0);
         for (a, b) in found.iter().zip(&expected) {
-            // Sums in another order.
+            // Sums in another order, and none below zero.
+            let a = a.max(0.0);
             assert!((a - b).abs() < 1e-4 * largest, "{a} for {b}");
         }
     }

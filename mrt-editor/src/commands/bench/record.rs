@@ -97,13 +97,18 @@ pub fn mark_pareto(records: &mut [Record]) {
     }
 }
 
-/// For each point whether no other is as small in both coordinates; of equal points the first.
+/// Share of an error that does not count as a difference: storage and the order of sums move errors by less.
+const SAME_ERROR: f64 = 0.005;
+
+/// For each point of time and error whether none is faster with an error no larger, up to [`SAME_ERROR`]; of points of
+/// equal time the best, and of equal points the first.
 pub fn frontier(points: &[[f64; 2]]) -> Vec<bool> {
     let is_beaten = |k: usize| {
-        let [x, y] = points[k];
-        points.iter().enumerate().any(|(i, &[other_x, other_y])| {
-            let is_better = other_x < x || other_y < y || i < k;
-            i != k && other_x <= x && other_y <= y && is_better
+        let [time, error] = points[k];
+        points.iter().enumerate().any(|(i, &[other, its_error])| {
+            let is_faster = other < time && its_error <= error * (1.0 + SAME_ERROR);
+            let is_first = its_error < error || (its_error == error && i < k);
+            is_faster || (other == time && is_first)
         })
     };
     (0..points.len()).map(|k| !is_beaten(k)).collect()

@@ -1,8 +1,7 @@
-use super::super::ours::{Ours, Variant};
+use super::super::ours::{Ours, Packing, Variant};
 use super::*;
 use crate::dictionary_source::from_file;
 use mrt_core::simd::SimdLevel;
-use mrt_core::storage::Storage;
 use mrt_runtime::assemble::Coupling;
 use mrt_runtime::dictionary::Dictionary;
 
@@ -18,7 +17,7 @@ fn errors(dictionary: &Dictionary, sample: usize) -> [f64; 2] {
     let variant = Variant {
         preset: "any",
         dictionary,
-        storage: Storage::F32,
+        storage: Packing::F32,
         coupling: Coupling::Table,
         simd: SimdLevel::detect(),
         threads: 1,
