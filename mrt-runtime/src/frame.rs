@@ -117,8 +117,8 @@ pub struct FrameConfig {
     pub tolerance: f32,
     /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
     /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long
-    /// again. Light that moves is there twice meanwhile, and where that is more than leaves the walls, all indirect light
-    /// is scaled down until the last block had its turn. `None`, the default: all.
+    /// again. Light that moves is there twice meanwhile; where indirect light comes to twice the most that left the walls,
+    /// all of it is scaled down until the last block had its turn. `None`, the default: all.
     pub slice: Option<NonZero<usize>>,
     /// Who does the work.
     pub executor: Arc<dyn Executor>,

@@ -133,7 +133,6 @@ fn no_block_waits_longer_than_stated() {
 
 /// A lamp that moves changes nothing at the other end of a long corridor, where another stands still.
 #[test]
-#[ignore = "in slices, limit_flux compares what leaves now with what arrived before, and dims what stands still"]
 fn in_slices_light_that_stands_still_is_not_dimmed() {
     let cells: Vec<[i32; 2]> = common::corridor(30);
     let scene = mobile(&floor_plan(&cells, 0.5));
