@@ -139,10 +139,10 @@ const MAX_LIGHTFIELD_NUMBERS: f64 = (1u64 << 28) as f64;
 const MAX_PATH_DEPTH: f64 = 8.0;
 
 /// Names of the presets.
-pub const PRESETS: [&str; 3] = ["mobile", "standard", "quality"];
+pub const PRESETS: [&str; 4] = ["mobile", "standard", "high", "quality"];
 
 impl BakeConfig {
-    /// A named preset: `mobile` (6² texels, 12 modes), `standard` (16², 32) or `quality` (16², 96).
+    /// A named preset: `mobile` (6² texels, 12 modes), `standard` (16², 32), `high` (16², 64) or `quality` (16², 96).
     ///
     /// # Errors
     /// [`ConfigError::UnknownPreset`].
@@ -151,6 +151,7 @@ impl BakeConfig {
         {
             "mobile" => (6, 12, 64, [32, 24, 12], 4),
             "standard" => (16, 32, 128, [96, 64, 32], 5),
+            "high" => (16, 64, 192, [160, 160, 48], 5),
             "quality" => (16, 96, 192, [160, 160, 96], 5),
             _ => {
                 return Err(ConfigError::UnknownPreset {

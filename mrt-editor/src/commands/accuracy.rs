@@ -25,7 +25,7 @@ pub struct AccuracyArgs {
     /// Reference descriptions, each with its numbers beside it in a file of the same name ending in .f32.
     #[arg(required = true, value_name = "REF.json")]
     pub references: Vec<PathBuf>,
-    /// Dictionary preset: mobile, standard or quality; all but standard are baked first.
+    /// Dictionary preset: mobile, standard, high or quality; all but standard are baked first.
     #[arg(long)]
     pub preset: Option<String>,
     /// Set of shapes of the preset [default: cubes-2d, and cubes-3d for references with cells one above another].

@@ -19,7 +19,7 @@ pub struct BakeArgs {
     /// rooms (cubes-2d, with doors and windows) or cylinders (round tubes and bends).
     #[arg(long, default_value = "cubes-2d")]
     pub set: String,
-    /// Quality and size: mobile, standard or quality.
+    /// Quality and size: mobile, standard, high or quality.
     #[arg(long, default_value = DEFAULT_PRESET)]
     pub preset: String,
     /// Dictionary file to write.

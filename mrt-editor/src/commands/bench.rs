@@ -54,7 +54,7 @@ pub struct BenchArgs {
     /// Lights in each maze [default: one for each ten blocks, 1 to 16].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub lights: Option<u16>,
-    /// Dictionary presets; all but standard are baked first [default: standard,mobile,quality, or standard,mobile with
+    /// Dictionary presets; all but standard are baked first [default: standard,mobile,high, or standard,mobile with
     /// --quick; none with --dictionary].
     #[arg(long, value_delimiter = ',', value_name = "PRESET,...")]
     pub presets: Vec<String>,
@@ -92,8 +92,8 @@ pub struct BenchArgs {
     /// All combinations of storage, coupling, instructions and threads.
     #[arg(long)]
     pub product: bool,
-    /// Measures only what the frame is held to, and says what is met; what needs the quality preset asks for its file with
-    /// --dictionary, or for --presets quality.
+    /// Measures only what the frame is held to, and says what is met; what needs the high preset asks for its file with
+    /// --dictionary, or for --presets high.
     #[arg(long)]
     pub figures: bool,
     /// Fewer mazes and dictionaries, and less time for each: about two minutes.
@@ -155,7 +155,7 @@ pub enum BenchError {
 
 /// Presets that are baked where they are asked for.
 const MOBILE: &str = "mobile";
-const QUALITY: &str = "quality";
+const HIGH: &str = "high";
 
 /// A dictionary and what it is called.
 struct Named {
@@ -228,7 +228,7 @@ fn presets(dictionaries: &[Named]) -> Presets<'_> {
     Presets {
         standard: named(DEFAULT_PRESET).expect(added),
         mobile: named(MOBILE).expect(added),
-        quality: named(QUALITY),
+        high: named(HIGH),
     }
 }
 

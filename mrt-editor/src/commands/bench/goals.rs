@@ -101,14 +101,14 @@ pub struct Presets<'a> {
     /// The smallest.
     pub mobile: &'a Dictionary,
     /// With 96 modes; baking it takes minutes.
-    pub quality: Option<&'a Dictionary>,
+    pub high: Option<&'a Dictionary>,
 }
 
 /// All products of the paper's way.
 const PAPER_STAGES: [usize; paper::STAGES.len()] = [0, 1, 2];
 
 /// Steps of [`Bench::goals`].
-const STEPS: usize = 7;
+const STEPS: usize = 8;
 
 /// Bytes of operators that maze41 may take, in units of 1e6.
 const MEGABYTES: f64 = 3.0;
@@ -227,6 +227,22 @@ impl Bench<'_> {
             eprintln!("mrt: two threads are left out: this machine has one core");
         }
 
+        next("1000 mazes of ten, ten blocks lit")?;
+        let many = Setting::islands(1000, LIGHTS_TOGETHER);
+        let one = Setting::islands(1, LIGHTS_TOGETHER);
+        let mut many = new(&many, &standard)?.with_motion(Motion::AllLights);
+        let mut one = new(&one, &standard)?.with_motion(Motion::AllLights);
+        let [of_many, of_one] = self.times([&mut many, &mut one])?;
+        let goal = Goal::ratio(
+            "ten lights move, frame: 1000 mazes of ten, one lit / one of them alone",
+            Limit::AtMost(2.0),
+            whole(&of_many),
+            whole(&of_one),
+        );
+        let lit = [many, one].map(|ours| ours.lit_blocks());
+        let detail = format!("{}; {} and {} blocks lit", goal.detail, lit[0], lit[1]);
+        goals.push(Goal { detail, ..goal });
+
         next("maze10000, ten blocks lit")?;
         let large = Setting::together(10_000, LIGHTS_TOGETHER);
         let small = Setting::together(LIGHTS_TOGETHER, LIGHTS_TOGETHER);
@@ -245,7 +261,7 @@ impl Bench<'_> {
         Ok(goals)
     }
 
-    /// Standard, and quality if there is one, against the paper's products of standard.
+    /// Standard, and high if there is one, against the paper's products of standard.
     fn against_paper(
         &mut self,
         presets: Presets,
@@ -256,18 +272,18 @@ impl Bench<'_> {
         let standard = fastest("standard", presets.standard);
         let mut ours = new(lit, &standard)?;
         let mut paper = Paper::new(lit, presets.standard, &ours, &mut self.libraries)?;
-        let mut quality = match presets.quality {
-            Some(dictionary) => Some(new(lit, &fastest("quality", dictionary))?),
+        let mut high = match presets.high {
+            Some(dictionary) => Some(new(lit, &fastest("high", dictionary))?),
             None => {
                 eprintln!(
-                    "mrt: quality / paper is left out: no dictionary of that preset (--dictionary FILE, or --presets \
-                     quality)"
+                    "mrt: high / paper is left out: no dictionary of that preset (--dictionary FILE, or --presets \
+                     high)"
                 );
                 None
             }
         };
         let mut subjects: Vec<&mut dyn Timed> = vec![&mut ours, &mut paper];
-        subjects.extend(quality.as_mut().map(|quality| quality as &mut dyn Timed));
+        subjects.extend(high.as_mut().map(|high| high as &mut dyn Timed));
         let times = in_turns(&mut subjects, self.budget, self.progress)?;
         let of_paper = Timing {
             times: &times[1],
@@ -294,7 +310,7 @@ impl Bench<'_> {
         ));
         if let Some(times) = times.get(2) {
             goals.push(Goal::ratio(
-                "maze41 all lit, indirect: quality / paper dense of standard",
+                "maze41 all lit, indirect: high / paper dense of standard",
                 Limit::AtMost(1.0),
                 indirect(times),
                 of_paper,

@@ -64,6 +64,33 @@ impl Setting {
         Self::with_lights_in(format!("maze{blocks}"), level, &lit)
     }
 
+    /// So many mazes side by side, of which light reaches one: as many blocks as [`Setting::together`] has lights.
+    pub fn islands(mazes: usize, blocks: usize) -> Self {
+        let one = maze(blocks, ALBEDO, SEED);
+        let side = (mazes as f64).sqrt().ceil() as usize;
+        let mut level = Level::default();
+        for k in 0..mazes {
+            let apart = 2.0 * blocks as f64;
+            let shift = DVec3::new((k % side) as f64 * apart, 0.0, (k / side) as f64 * apart);
+            let first = level.blocks.len();
+            level
+                .blocks
+                .extend(one.blocks.iter().cloned().map(|mut block| {
+                    block.warp.corners = block.warp.corners.map(|corner| corner + shift);
+                    block
+                }));
+            level
+                .connections
+                .extend(one.connections.iter().map(|&(mut connection)| {
+                    connection.a.block += first;
+                    connection.b.block += first;
+                    connection
+                }));
+        }
+        let lit: Vec<usize> = (0..blocks).collect();
+        Self::with_lights_in(format!("maze{blocks}x{mazes}"), level, &lit)
+    }
+
     fn with_lights_in(name: String, level: Level, lit: &[usize]) -> Self {
         let place = |(light, &block): (usize, &usize)| {
             let jitter = |axis: u32| {

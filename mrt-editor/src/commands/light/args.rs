@@ -30,7 +30,7 @@ pub struct LightArgs {
     /// Dictionary file [default: the built-in one].
     #[arg(long)]
     pub dictionary: Option<PathBuf>,
-    /// Preset to bake on the spot instead: mobile, standard or quality.
+    /// Preset to bake on the spot instead: mobile, standard, high or quality.
     #[arg(long, conflicts_with = "dictionary")]
     pub preset: Option<String>,
     /// Number of bounces, or `all`.
