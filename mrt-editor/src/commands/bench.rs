@@ -263,7 +263,7 @@ fn dictionaries(args: &BenchArgs) -> Result<Vec<Named>, BenchError> {
         (true, false) => Vec::new(),
         (true, true) if args.figures => Vec::new(),
         (true, true) if args.quick => vec![DEFAULT_PRESET, MOBILE],
-        (true, true) => vec![DEFAULT_PRESET, MOBILE, QUALITY],
+        (true, true) => vec![DEFAULT_PRESET, MOBILE, HIGH],
     };
     // All names are checked before the first bake.
     for preset in &presets {

@@ -194,6 +194,11 @@ impl DirectStage {
         self.hits.sort_unstable();
     }
 
+    /// Whether some blocks wait for direct light.
+    pub(super) fn has_waiting(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
     fn wait_for(&mut self, block: u32) {
         if !self.is_waiting[block as usize] {
             self.is_waiting[block as usize] = true;

@@ -28,6 +28,7 @@ pub(super) fn limit_flux(
     blocks: &mut Blocks,
     indirect: &mut Planes,
     joint: &mut [f32],
+    nothing_waits: bool,
 ) -> usize {
     let mut limited = 0;
     let layout = &scene.layout;
@@ -41,7 +42,7 @@ pub(super) fn limit_flux(
             arrived += state.arrived[channel];
         }
         let most = &mut blocks.most_sent[channel];
-        if blocks.waiting.is_empty() {
+        if nothing_waits {
             *most = sent;
         } else {
             *most = most.max(sent);

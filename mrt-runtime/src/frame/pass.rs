@@ -159,8 +159,14 @@ impl Frame {
             blocks.touch(block, resent);
             blocks.mark_changed(block);
         }
-        self.work.limited +=
-            limit_flux(scene, &mut self.blocks, &mut self.indirect, &mut self.joint);
+        let nothing_waits = self.blocks.waiting.is_empty() && !self.lights.has_waiting();
+        self.work.limited += limit_flux(
+            scene,
+            &mut self.blocks,
+            &mut self.indirect,
+            &mut self.joint,
+            nothing_waits,
+        );
         let peaks = self.blocks.alive.iter();
         let peak = peaks.fold(0.0f32, |m, &block| {
             m.max(self.blocks.state[block as usize].peak)
