@@ -212,7 +212,7 @@ fn a_hundred_thousand_frames_do_not_drift() {
             }
             run.step();
             solve(&mut frame, &run.scene, &run.lights, Bounces::Count(1));
-            if run.frame % 4 == 0 {
+            if run.frame.is_multiple_of(4) {
                 solve(&mut feedback, &run.scene, &run.lights, Bounces::Feedback);
                 forgetful.forget();
                 solve(&mut forgetful, &run.scene, &run.lights, Bounces::Feedback);

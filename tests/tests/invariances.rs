@@ -3,8 +3,8 @@
 mod common;
 
 use common::{
-    CONVERGED, Random, assembled, by_texel, corridor, default_dictionary, floor_plan,
-    largest_difference, solved, sphere,
+    CONVERGED, Random, by_texel, corridor, default_dictionary, floor_plan, largest_difference,
+    solved, sphere,
 };
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};

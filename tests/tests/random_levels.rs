@@ -139,10 +139,10 @@ proptest! {
         let single = solved(&scene, &lights, Bounces::Count(1));
         prop_assert!(single.indirect().iter().all(|e| e.is_finite() && *e >= 0.0));
         let mut emitted = [0.0; 3];
-        for texel in 0..scene.texel_count() {
+        for (texel, area) in areas.iter().enumerate() {
             let emission = scene.texel_emission(texel);
             for (c, sum) in emitted.iter_mut().enumerate() {
-                *sum += areas[texel] * f64::from(emission[c]);
+                *sum += area * f64::from(emission[c]);
             }
         }
         let mut sent = flux(&single.direct(), true);
