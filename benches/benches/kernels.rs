@@ -10,12 +10,15 @@
 )]
 
 use divan::{Bencher, black_box, counter::ItemsCount};
-use mrt_core::simd::folded::{Reflected, Unfolded, fold, unfold};
+use mrt_core::simd::folded::{Albedo, Reflected, Unfolded, fold, unfold};
 use mrt_core::simd::tiles::{
-    CHANNELS, ColumnLists, DOT_ROWS, Element, HALF_TILE, Rgb, TILE, Term, TileSums, add_half_tile,
-    add_tile, add_two_tiles, dot_rows,
+    CHANNELS, ColumnLists, DOT_ROWS, Element, HALF_TILE, Rgb, TILE, Term, TileOut, dot_rows,
+    sum_half_tile, sum_tile, sum_two_tiles,
 };
 use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+
+/// Red, green and blue of a tile.
+type TileSums = [[f32; TILE]; CHANNELS];
 
 fn main() {
     println!("instructions: {}", level().name());
@@ -108,17 +111,31 @@ impl<E: Element> Kernel for RunTiles<'_, E> {
         let columns = product.lists.get(0..product.columns);
         let x = Rgb::new(&product.x, product.columns);
         let panels = [&product.panels[0][..], &product.panels[1][..]];
+        let scales = &[];
         let one = Term {
             panels: [panels[0]],
             columns,
             x,
+            scales,
         };
+        let two = Term {
+            panels,
+            columns,
+            x,
+            scales,
+        };
+        let [first, second] = sums;
+        let [first, second] = [out(first), out(second)];
         match product.tiles {
-            Tiles::One => add_tile(l, std::iter::once(one), &mut sums[0]),
-            Tiles::Half => add_half_tile(l, std::iter::once(one), &mut sums[0]),
-            Tiles::Two => add_two_tiles(l, Term { panels, columns, x }, sums.each_mut()),
+            Tiles::One => sum_tile(l, std::iter::once(one), first),
+            Tiles::Half => sum_half_tile(l, std::iter::once(one), first),
+            Tiles::Two => sum_two_tiles(l, two, [first, second]),
         }
     }
+}
+
+fn out(sums: &mut TileSums) -> TileOut<'_> {
+    sums.each_mut().map(|channel| &mut channel[..])
 }
 
 fn tiles<E: Number>(bencher: Bencher, tiles: Tiles, columns: usize) {
@@ -170,17 +187,17 @@ fn level_run<K: Kernel>(kernel: K) -> K::Output {
     LEVEL.get_or_init(level).run(kernel)
 }
 
-#[divan::bench(name = "add_tile", types = [f32, u16, i8], args = COLUMNS)]
+#[divan::bench(name = "sum_tile", types = [f32, u16, i8], args = COLUMNS)]
 fn one_tile<E: Number>(bencher: Bencher, columns: usize) {
     tiles::<E>(bencher, Tiles::One, columns);
 }
 
-#[divan::bench(name = "add_two_tiles", types = [f32, u16, i8], args = COLUMNS)]
+#[divan::bench(name = "sum_two_tiles", types = [f32, u16, i8], args = COLUMNS)]
 fn two_tiles<E: Number>(bencher: Bencher, columns: usize) {
     tiles::<E>(bencher, Tiles::Two, columns);
 }
 
-#[divan::bench(name = "add_half_tile", types = [f32, u16, i8], args = COLUMNS)]
+#[divan::bench(name = "sum_half_tile", types = [f32, u16, i8], args = COLUMNS)]
 fn half_tile<E: Number>(bencher: Bencher, columns: usize) {
     tiles::<E>(bencher, Tiles::Half, columns);
 }
@@ -268,7 +285,7 @@ fn folds(bencher: Bencher, what: &str) {
     let light = Reflected {
         direct: &direct,
         indirect: with_indirect.then_some(&direct[..]),
-        albedo: &albedo[5..],
+        albedo: Albedo::Each(&albedo[5..]),
         emission: None,
     };
     level_run(RunFold {
@@ -282,7 +299,7 @@ fn folds(bencher: Bencher, what: &str) {
             let (mut exact, mut size) = (0.0, 0.0);
             for element in 0..GROUP {
                 let k = element * STRIDE + at;
-                let sent = times * f64::from(direct[k]) * f64::from(light.albedo[k]);
+                let sent = times * f64::from(direct[k]) * f64::from(albedo[5 + k]);
                 exact += sign(element, class) * sent;
                 size += sent;
             }
@@ -301,57 +318,45 @@ fn folds(bencher: Bencher, what: &str) {
 }
 
 struct RunUnfold<'a> {
-    classes: &'a [TileSums],
+    folded: &'a [f32],
     weight: &'a [f32],
-    signals: [&'a mut [f32]; CHANNELS],
+    signal: &'a mut [f32],
 }
 
 impl Kernel for RunUnfold<'_> {
     type Output = f32;
     #[inline(always)]
-    fn run<L: Lanes>(mut self, l: L) -> f32 {
+    fn run<L: Lanes>(self, l: L) -> f32 {
         let mut found = Unfolded::new(l);
-        let mut first = 0;
-        while first < STRIDE {
-            let classes: [&TileSums; GROUP] = std::array::from_fn(|class| &self.classes[class]);
-            let signals = &mut self.signals;
-            unfold::<L, GROUP, false>(l, classes, first, self.weight, signals, &mut found);
-            first += TILE;
-        }
-        found.sum(l, 0)
+        unfold::<L, GROUP, false>(l, self.folded, STRIDE, self.weight, self.signal, &mut found)
     }
 }
 
 #[divan::bench(name = "unfold")]
 fn unfolds(bencher: Bencher) {
-    let value = |class: usize, channel: usize, row: usize| {
-        f32::from(small(row + TILE * (channel + CHANNELS * class))) / 8.0
-    };
-    let classes: Vec<TileSums> = (0..GROUP)
-        .map(|class| std::array::from_fn(|c| std::array::from_fn(|row| value(class, c, row))))
+    let folded: Vec<f32> = (0..GROUP * STRIDE)
+        .map(|k| f32::from(small(k)) / 8.0)
         .collect();
     let weight = vec![1.0; STRIDE];
-    let mut planes = [(); CHANNELS].map(|()| vec![0.0; GROUP * STRIDE]);
+    let mut signal = vec![0.0; GROUP * STRIDE];
     level_run(RunUnfold {
-        classes: &classes,
+        folded: &folded,
         weight: &weight,
-        signals: planes.each_mut().map(|plane| &mut plane[..]),
+        signal: &mut signal,
     });
-    for (channel, plane) in planes.iter().enumerate() {
-        for (k, &found) in plane.iter().enumerate() {
-            let (element, row) = (k / STRIDE, k % STRIDE % TILE);
-            let terms = (0..GROUP)
-                .map(|class| sign(element, class) * f64::from(value(class, channel, row)));
-            check("unfold", found, terms.sum::<f64>().max(0.0), 8.0);
-        }
+    for (k, &found) in signal.iter().enumerate() {
+        let (element, at) = (k / STRIDE, k % STRIDE);
+        let terms =
+            (0..GROUP).map(|class| sign(element, class) * f64::from(folded[class * STRIDE + at]));
+        check("unfold", found, terms.sum::<f64>().max(0.0), 8.0);
     }
     bencher
-        .counter(ItemsCount::new(CHANNELS * GROUP * STRIDE))
+        .counter(ItemsCount::new(GROUP * STRIDE))
         .bench_local(|| {
             level_run(RunUnfold {
-                classes: black_box(&classes),
+                folded: black_box(&folded),
                 weight: &weight,
-                signals: planes.each_mut().map(|plane| &mut plane[..]),
+                signal: &mut signal,
             })
         });
 }
@@ -424,7 +429,14 @@ impl Kernel for TiledProduct<'_> {
                 let mut sums = [[[0.0; TILE]; CHANNELS]; 2];
                 let tile = row / TILE;
                 let panels = [panel(tile), panel(tile + 1)];
-                add_two_tiles(l, Term { panels, columns, x }, sums.each_mut());
+                let term = Term {
+                    panels,
+                    columns,
+                    x,
+                    scales: &[],
+                };
+                let [upper, lower] = &mut sums;
+                sum_two_tiles(l, term, [out(upper), out(lower)]);
                 for (tile, sums) in sums.iter().enumerate() {
                     for (channel, sums) in sums.iter().enumerate() {
                         let at = (first + channel) * m + row + tile * TILE;

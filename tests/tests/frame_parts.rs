@@ -131,7 +131,7 @@ fn no_block_waits_longer_than_stated() {
     }
 }
 
-/// A lamp that moves changes nothing at the other end of a long corridor, where another stands still.
+/// A lamp that moves changes next to nothing at the other end of a long corridor, where another stands still.
 #[test]
 fn in_slices_light_that_stands_still_is_not_dimmed() {
     let cells: Vec<[i32; 2]> = common::corridor(30);
@@ -147,11 +147,15 @@ fn in_slices_light_that_stands_still_is_not_dimmed() {
         if step == 29 {
             still = Some(now);
         } else if let Some(still) = &still {
+            // Down the straight corridor the lamp that moves makes 1e-4 of this light. Dimming took a quarter of it.
+            let apart = now
+                .iter()
+                .zip(still)
+                .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+            let brightest = still.iter().fold(0.0f32, |m, &e| m.max(e));
             assert!(
-                now == *still,
-                "frame {step}: {} of {}",
-                now[100],
-                still[100]
+                apart < 1e-3 * brightest,
+                "frame {step}: {apart} of {brightest}"
             );
         }
     }

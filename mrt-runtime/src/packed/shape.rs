@@ -42,7 +42,7 @@ pub struct PackedShape {
     pub(crate) coefficient_norms: Vec<f32>,
     /// SH coefficients of probes, coefficient by coefficient and in that probe by probe.
     pub(crate) probes: Tiled,
-    /// Vector irradiance, coefficient by coefficient and in that texel by texel.
+    /// Vector irradiance, texel by texel and in that coefficient by coefficient.
     pub(crate) vector: Tiled,
 }
 
@@ -223,7 +223,7 @@ impl PackedShape {
             vector: Tiled::new(
                 operators.vector_basis,
                 operators.vector_basis.rows(),
-                |k| k % texels * 4 + k / texels,
+                |k| k,
                 storage,
             ),
             folding,
