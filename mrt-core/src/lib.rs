@@ -6,7 +6,6 @@
 //! colour channel. Axes are right-handed with +Y up. Bakes use `f64` and only operations whose
 //! bits do not depend on the machine; see `docs/CONVENTIONS.md`.
 
-pub mod block_sparse;
 #[cfg(feature = "bvh")]
 pub mod bvh;
 pub mod container;

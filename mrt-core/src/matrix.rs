@@ -2,7 +2,7 @@
 //!
 //! Every product here is the scalar reference: each output element is summed in one fixed order,
 //! so the bits depend neither on the instruction set nor on how callers split the columns over
-//! threads. Faster kernels for the frame take their place behind the same names.
+//! threads. Bakes use them; frames have kernels of their own ([`tiles`](crate::simd::tiles)).
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Range};
