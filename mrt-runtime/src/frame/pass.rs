@@ -96,7 +96,12 @@ impl Frame {
     fn pass(&mut self, scene: &Scene, reflects_indirect: bool, goes_on: bool) -> f32 {
         let start = Instant::now();
         let all = std::mem::take(&mut self.blocks.all_stale);
-        let tolerance = if goes_on { self.config.tolerance } else { 0.0 };
+        // What is no number tolerates nothing.
+        let tolerance = if goes_on {
+            self.config.tolerance.max(0.0)
+        } else {
+            0.0
+        };
         let blocks = &mut self.blocks;
         blocks.alive.sort_unstable();
         blocks.sources.clear();
