@@ -131,7 +131,7 @@ fn wrong_flags_are_refused_with_what_was_expected() {
         (
             &["--presets", "best"],
             1,
-            "expected one of mobile, standard, quality",
+            "expected one of mobile, standard, high, quality",
         ),
         (&["--modes", "0"], 1, "number of modes is 0; expected 1 to"),
         (&["--dictionary", "missing.mrt"], 1, "missing.mrt"),
