@@ -30,7 +30,8 @@ pub struct AssembleConfig {
     /// How `T_b->r` is kept, the largest part of a large level. `f16` errs by 0.02 %.
     pub transport_storage: Storage,
     /// Share in L2, in [0, 1), of the light from one block to another that may be left out where that saves work. The
-    /// default leaves a fourth of the products out and errs by 0.08 % in mazes, where a standard dictionary errs by 2 %.
+    /// default leaves three tenths of the products out. In a maze of 41 blocks it errs by 0.08 % with a light in every
+    /// block and by 0.16 % with four lights, where a standard dictionary errs by 1 and 2 %.
     pub negligible: f32,
 }
 
