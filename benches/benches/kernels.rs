@@ -10,12 +10,13 @@
 )]
 
 use divan::{Bencher, black_box, counter::ItemsCount};
-use mrt_core::simd::folded::{Albedo, Reflected, Unfolded, fold, unfold};
+use mrt_core::simd::folded::{Albedo, Basis, Folded, Reflected, Unfolded, fold, unfold};
+use mrt_core::simd::rows::{DOT_ROWS, dot_rows};
 use mrt_core::simd::tiles::{
-    CHANNELS, ColumnLists, DOT_ROWS, Element, HALF_TILE, Rgb, TILE, Term, TileOut, dot_rows,
-    sum_half_tile, sum_tile, sum_two_tiles,
+    CHANNELS, ColumnLists, Element, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
+    sum_two_tiles,
 };
-use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 
 /// Red, green and blue of a tile.
 type TileSums = [[f32; TILE]; CHANNELS];
@@ -35,7 +36,7 @@ fn level() -> SimdLevel {
 }
 
 /// Numbers as operators are stored.
-trait Number: Element + std::fmt::Debug {
+trait Number: Element + bytemuck::Pod + std::fmt::Debug {
     const NAME: &'static str;
     /// A number of -8 to 8, which every storage has exactly.
     fn of(small: i8) -> Self;
@@ -70,7 +71,7 @@ fn small(k: usize) -> i8 {
 }
 
 /// Light, which no storage rounds.
-fn light(count: usize) -> Vec<f32> {
+fn light(count: usize) -> Aligned<f32> {
     (0..count).map(|k| 0.1 + 0.01 * (k % 97) as f32).collect()
 }
 
@@ -210,7 +211,7 @@ struct RunDots<'a, E> {
 }
 
 impl<E: Element> Kernel for RunDots<'_, E> {
-    type Output = [[f32; CHANNELS]; DOT_ROWS];
+    type Output = [[f32; DOT_ROWS]; CHANNELS];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
         dot_rows(l, self.rows, self.x)
@@ -220,13 +221,13 @@ impl<E: Element> Kernel for RunDots<'_, E> {
 /// Lengths are orbits of texels: of a mobile straight, a standard corner, one and a half of a standard straight.
 #[divan::bench(name = "dot_rows", types = [f32, u16, i8], args = [32, 128, 192, 1536])]
 fn dots<E: Number>(bencher: Bencher, length: usize) {
-    let rows: Vec<E> = (0..DOT_ROWS * length).map(|k| E::of(small(k))).collect();
+    let rows: Aligned<E> = (0..DOT_ROWS * length).map(|k| E::of(small(k))).collect();
     let x = light(CHANNELS * length);
     let channels: [&[f32]; CHANNELS] = std::array::from_fn(|c| &x[c * length..(c + 1) * length]);
     let (rows, x) = (&rows[..], channels);
     let found = level_run(RunDots { rows, x });
-    for (row, found) in found.iter().enumerate() {
-        for (channel, &found) in found.iter().enumerate() {
+    for (channel, found) in found.iter().enumerate() {
+        for (row, &found) in found.iter().enumerate() {
             let (mut exact, mut size) = (0.0, 0.0);
             for (k, &x) in x[channel].iter().enumerate() {
                 let term = f64::from(small(row * length + k)) * f64::from(x);
@@ -267,25 +268,32 @@ struct RunFold<'a> {
 }
 
 impl Kernel for RunFold<'_> {
-    type Output = [f32; 2];
+    type Output = Folded;
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> [f32; 2] {
-        fold::<L, GROUP>(l, self.light, self.weight, self.folded, STRIDE)
+    fn run<L: Lanes>(self, l: L) -> Folded {
+        fold::<L, GROUP>(l, self.light, self.weight, self.folded)
     }
 }
 
 const BOTH: &str = "direct and indirect";
 
+/// Red, green and blue of a signal.
+fn channels(signal: &[f32]) -> [&[f32]; CHANNELS] {
+    let length = signal.len() / CHANNELS;
+    std::array::from_fn(|c| &signal[c * length..(c + 1) * length])
+}
+
 #[divan::bench(name = "fold", args = ["direct", BOTH])]
 fn folds(bencher: Bencher, what: &str) {
     let with_indirect = what == BOTH;
-    let (direct, albedo) = (light(GROUP * STRIDE), light(GROUP * STRIDE + 5));
-    let weight = vec![1.0; STRIDE];
-    let mut folded = vec![0.0; GROUP * STRIDE];
+    let direct = light(CHANNELS * GROUP * STRIDE);
+    let albedo: Aligned<f32> = direct.iter().rev().copied().collect();
+    let weight: Aligned<f32> = (0..STRIDE).map(|_| 1.0).collect();
+    let mut folded = Aligned::zeroed(CHANNELS * GROUP * STRIDE);
     let light = Reflected {
-        direct: &direct,
-        indirect: with_indirect.then_some(&direct[..]),
-        albedo: Albedo::Each(&albedo[5..]),
+        direct: channels(&direct),
+        indirect: with_indirect.then_some(channels(&direct)),
+        albedo: Albedo::Each(channels(&albedo)),
         emission: None,
     };
     level_run(RunFold {
@@ -295,19 +303,22 @@ fn folds(bencher: Bencher, what: &str) {
     });
     let times = if with_indirect { 2.0 } else { 1.0 };
     for class in 0..GROUP {
-        for at in 0..STRIDE {
-            let (mut exact, mut size) = (0.0, 0.0);
-            for element in 0..GROUP {
-                let k = element * STRIDE + at;
-                let sent = times * f64::from(direct[k]) * f64::from(albedo[5 + k]);
-                exact += sign(element, class) * sent;
-                size += sent;
+        for channel in 0..CHANNELS {
+            for at in 0..STRIDE {
+                let (mut exact, mut size) = (0.0, 0.0);
+                for element in 0..GROUP {
+                    let k = (channel * GROUP + element) * STRIDE + at;
+                    let sent = times * f64::from(direct[k]) * f64::from(albedo[k]);
+                    exact += sign(element, class) * sent;
+                    size += sent;
+                }
+                let found = folded[(class * CHANNELS + channel) * STRIDE + at];
+                check("fold", found, exact, size);
             }
-            check("fold", folded[class * STRIDE + at], exact, size);
         }
     }
     bencher
-        .counter(ItemsCount::new(GROUP * STRIDE))
+        .counter(ItemsCount::new(CHANNELS * GROUP * STRIDE))
         .bench_local(|| {
             level_run(RunFold {
                 light: black_box(light),
@@ -317,48 +328,63 @@ fn folds(bencher: Bencher, what: &str) {
         });
 }
 
-struct RunUnfold<'a> {
-    folded: &'a [f32],
-    weight: &'a [f32],
-    signal: &'a mut [f32],
+/// Modes of a class, as of a standard block.
+const MODES: usize = 8;
+
+struct RunUnfold<'a, E> {
+    basis: Basis<'a, E>,
+    x: Rgb<'a>,
+    signal: [&'a mut [f32]; CHANNELS],
 }
 
-impl Kernel for RunUnfold<'_> {
-    type Output = f32;
+impl<E: Element> Kernel for RunUnfold<'_, E> {
+    type Output = Unfolded;
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> f32 {
-        let mut found = Unfolded::new(l);
-        unfold::<L, GROUP, false>(l, self.folded, STRIDE, self.weight, self.signal, &mut found)
+    fn run<L: Lanes>(mut self, l: L) -> Unfolded {
+        unfold::<L, E, GROUP, false>(l, self.basis, self.x, &mut self.signal)
     }
 }
 
-#[divan::bench(name = "unfold")]
-fn unfolds(bencher: Bencher) {
-    let folded: Vec<f32> = (0..GROUP * STRIDE)
-        .map(|k| f32::from(small(k)) / 8.0)
-        .collect();
-    let weight = vec![1.0; STRIDE];
-    let mut signal = vec![0.0; GROUP * STRIDE];
-    level_run(RunUnfold {
-        folded: &folded,
-        weight: &weight,
-        signal: &mut signal,
-    });
+/// Products with a basis, and the sums and differences that make texels of them; products are counted.
+#[divan::bench(name = "unfold", types = [f32, u16, i8])]
+fn unfolds<E: Number>(bencher: Bencher) {
+    let columns = GROUP * MODES;
+    let tiles: Aligned<E> = (0..columns * STRIDE).map(|k| E::of(small(k))).collect();
+    let classes: Vec<_> = (0..GROUP).map(|c| c * MODES..(c + 1) * MODES).collect();
+    let weight: Aligned<f32> = (0..STRIDE).map(|_| 1.0).collect();
+    let x = light(CHANNELS * columns);
+    let mut signal = Aligned::zeroed(CHANNELS * GROUP * STRIDE);
+    let run = |signal: &mut [f32]| {
+        let (red, rest) = signal.split_at_mut(GROUP * STRIDE);
+        let (green, blue) = rest.split_at_mut(GROUP * STRIDE);
+        let basis = Basis {
+            tiles: black_box(&tiles[..]),
+            classes: &classes,
+            weight: &weight,
+        };
+        let x = Rgb::new(&x, columns);
+        level_run(RunUnfold {
+            basis,
+            x,
+            signal: [red, green, blue],
+        })
+    };
+    run(&mut signal);
     for (k, &found) in signal.iter().enumerate() {
+        let (channel, k) = (k / (GROUP * STRIDE), k % (GROUP * STRIDE));
         let (element, at) = (k / STRIDE, k % STRIDE);
-        let terms =
-            (0..GROUP).map(|class| sign(element, class) * f64::from(folded[class * STRIDE + at]));
-        check("unfold", found, terms.sum::<f64>().max(0.0), 8.0);
+        let (mut exact, mut size) = (0.0, 0.0);
+        for column in 0..columns {
+            let number = small((at / TILE * columns + column) * TILE + at % TILE);
+            let term = f64::from(number) * f64::from(x[channel * columns + column]);
+            exact += sign(element, column / MODES) * term;
+            size += term.abs();
+        }
+        check(E::NAME, found, exact.max(0.0), size);
     }
     bencher
-        .counter(ItemsCount::new(GROUP * STRIDE))
-        .bench_local(|| {
-            level_run(RunUnfold {
-                folded: black_box(&folded),
-                weight: &weight,
-                signal: &mut signal,
-            })
-        });
+        .counter(ItemsCount::new(CHANNELS * columns * STRIDE))
+        .bench_local(|| run(&mut signal));
 }
 
 // ---- Dense products ----
@@ -459,7 +485,7 @@ fn product_tiles(bencher: Bencher, size: Size) {
         let (tile, column, row) = (at / (TILE * k), at / TILE % k, at % TILE);
         f32::from(small(column * m + tile * TILE + row))
     };
-    let panels: Vec<f32> = (0..m * k).map(number).collect();
+    let panels: Aligned<f32> = (0..m * k).map(number).collect();
     let mut lists = ColumnLists::default();
     lists.push(0..k as u32);
     dense(bencher, size, |_, b, out| {
@@ -493,10 +519,9 @@ impl Kernel for DotProduct<'_> {
             let mut row = 0;
             while row < m {
                 let sums = dot_rows(l, &self.rows[row * k..(row + DOT_ROWS) * k], x);
-                for (at, sums) in sums.iter().enumerate() {
-                    for (channel, &sum) in sums.iter().enumerate() {
-                        self.out[(first + channel) * m + row + at] = sum;
-                    }
+                for (channel, sums) in sums.iter().enumerate() {
+                    let at = (first + channel) * m + row;
+                    self.out[at..at + DOT_ROWS].copy_from_slice(sums);
                 }
                 row += DOT_ROWS;
             }
@@ -509,7 +534,7 @@ impl Kernel for DotProduct<'_> {
 #[divan::bench(args = SIZES.into_iter().filter(|size| size.0[1].is_multiple_of(mrt_core::simd::WIDEST)))]
 fn product_rows(bencher: Bencher, size: Size) {
     let Size([m, k, _]) = size;
-    let rows: Vec<f32> = (0..m * k)
+    let rows: Aligned<f32> = (0..m * k)
         .map(|at| f32::from(small(at % k * m + at / k)))
         .collect();
     dense(bencher, size, |_, b, out| {

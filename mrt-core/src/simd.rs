@@ -7,14 +7,17 @@
 //! Bits differ between levels, since they add in different orders and some fuse a product with a sum; each level gives
 //! the same bits on every machine that has it.
 
+mod aligned;
 pub mod folded;
 mod lanes;
+pub mod rows;
 pub mod tiles;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub use aligned::Aligned;
 pub use lanes::{Lanes, Scalar, WIDEST, f32_from_f16_bits};
 
 /// Which instructions to use.
@@ -26,7 +29,7 @@ pub enum SimdLevel {
     Sse2,
     /// 8 lanes with AVX2, FMA and F16C.
     Avx2,
-    /// 16 lanes with AVX-512 F.
+    /// 16 lanes with AVX-512 F and VL.
     Avx512,
     /// 4 lanes; every 64-bit ARM has it.
     Neon,

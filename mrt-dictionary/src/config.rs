@@ -149,7 +149,7 @@ impl BakeConfig {
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
         let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name
         {
-            "mobile" => (6, 12, 64, [32, 24, 12], 4),
+            "mobile" => (6, 12, 64, [32, 24, 8], 4),
             "standard" => (16, 32, 128, [96, 64, 32], 5),
             "high" => (16, 64, 192, [160, 160, 48], 5),
             "quality" => (16, 96, 192, [160, 160, 96], 5),

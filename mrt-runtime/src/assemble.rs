@@ -12,7 +12,8 @@ use crate::wall::UnitFromWorld;
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
-use mrt_core::simd::tiles::HALF_TILE;
+use mrt_core::simd::WIDEST;
+use mrt_core::simd::rows::DOT_ROWS;
 use mrt_core::storage::Storage;
 use std::sync::Arc;
 
@@ -503,22 +504,19 @@ fn layout(blocks: &[SceneBlock], shapes: &[PackedShape]) -> Layout {
         slots.push(next..next + count);
         next += count;
     }
-    let most = |count: fn(&PackedShape) -> usize| {
-        let most = shapes.iter().map(count).max().unwrap_or(0);
-        most.next_multiple_of(HALF_TILE)
-    };
+    let most = shapes.iter().map(|shape| shape.rows).max().unwrap_or(0);
     Layout {
         shapes: order.iter().map(|&block| shape_of(block) as u32).collect(),
-        modes: order
+        row_of_mode: shapes
             .iter()
-            .map(|&block| shapes[shape_of(block)].modes as u32)
+            .map(|shape| shape.row_of_mode[..shape.modes].to_vec())
             .collect(),
         slot_of_texel: shapes
             .iter()
             .map(|shape| shape.folding.slot_of_texel.clone())
             .collect(),
-        coefficient_stride: most(|shape| shape.modes),
-        joint_stride: most(|shape| shape.joint_modes),
+        // Kernels write groups of rows, and the last may be of one.
+        rows: (most + DOT_ROWS - 1).next_multiple_of(WIDEST),
         order,
         rank,
         slots,

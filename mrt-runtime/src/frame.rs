@@ -20,7 +20,7 @@ use direct_stage::DirectStage;
 use glam::Vec3;
 pub(crate) use kernels::{Expand, Scratch};
 use mrt_core::ohlsh::evaluate_f32;
-use mrt_core::simd::SimdLevel;
+use mrt_core::simd::{Aligned, SimdLevel};
 use std::num::NonZero;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -76,6 +76,9 @@ pub struct FrameWork {
     pub sources: usize,
     /// Blocks whose indirect light was computed.
     pub targets: usize,
+    /// Blocks that changed light was sent to and whose light stays what it was: it changes by no more than
+    /// [`FrameConfig::tolerance`].
+    pub kept: usize,
     /// Channels that were scaled down, as more light arrived in them than left: then the next frame computes all anew.
     pub limited: usize,
 }
@@ -109,11 +112,14 @@ pub struct FrameConfig {
     pub outputs: Outputs,
     /// Instructions to use; the scalar reference where the machine lacks them.
     pub simd: SimdLevel,
-    /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, with
-    /// [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. Of a texel of albedo a, the light that it reflects is then off by
-    /// at most a times this at each bounce, so by `tolerance a / (1 - a)` over all. At 0, the default, what is kept is kept
-    /// because nothing about it changed, bit by bit; with feedback, rounding then changes the last bits for ever, and
-    /// some 1e-6 of the brightest irradiance lets static light come to rest.
+    /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, and by which light
+    /// that arrives may change before it is shown; with [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. With albedos of
+    /// up to a, indirect light is then off by at most `tolerance (1 + a)` after one bounce, and by
+    /// `tolerance (1 + a) / (1 - a)` over all; vector irradiance by no more, and coefficients of probes, which are turned
+    /// to the world's axes five at a time, by √5 times that. At 0, the
+    /// default, what is kept is kept because nothing about it changed, bit by bit; with feedback, rounding then changes
+    /// the last bits for ever, and some 1e-6 of the brightest irradiance lets static light come to rest. With 1e-3 of the
+    /// brightest, one light of many costs a third of all.
     pub tolerance: f32,
     /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
     /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long
@@ -165,8 +171,8 @@ pub struct Frame {
     lights: DirectStage,
     direct: Planes,
     indirect: Planes,
-    coefficients: Vec<f32>,
-    joint: Vec<f32>,
+    coefficients: Aligned<f32>,
+    joint: Aligned<f32>,
     doors: Vec<f32>,
     gate_values: Vec<f32>,
     blocks: Blocks,
@@ -248,7 +254,7 @@ impl Frame {
         let blocks = layout.block_count();
         let slots = layout.slots.iter().map(|range| range.len()).max();
         let slots = slots.unwrap_or(0);
-        let coefficients = layout.coefficient_stride.max(layout.joint_stride);
+        let coefficients = 3 * layout.rows;
         let tasks = match config.executor.workers() {
             0 | 1 => 1,
             _ => MAX_TASKS,
@@ -261,8 +267,8 @@ impl Frame {
             lights: DirectStage::new(scene, tasks, slots),
             direct: Planes::new(layout.slot_count()),
             indirect: Planes::new(layout.slot_count()),
-            coefficients: vec![0.0; 3 * layout.coefficient_stride * blocks],
-            joint: vec![0.0; 3 * layout.joint_stride * blocks],
+            coefficients: Aligned::zeroed(coefficients * blocks),
+            joint: Aligned::zeroed(coefficients * blocks),
             doors: scene.doors.clone(),
             gate_values: vec![0.0; scene.transport.gates.len()],
             blocks: Blocks::new(blocks, scene.atlas.tile_list_size()),
@@ -395,7 +401,7 @@ impl Frame {
         }
         let after_atlas = Instant::now();
         let joint = |place: usize| {
-            let size = 3 * self.layout.joint_stride;
+            let size = 3 * self.layout.rows;
             &self.joint[place * size..(place + 1) * size]
         };
         if let Some(probes) = &mut self.probes {
@@ -450,12 +456,7 @@ impl Frame {
             (
                 "coefficients",
                 self.coefficients.len() / 3,
-                scene.layout.coefficient_stride * scene.blocks.len(),
-            ),
-            (
-                "joint coefficients",
-                self.joint.len() / 3,
-                scene.layout.joint_stride * scene.blocks.len(),
+                scene.layout.rows * scene.blocks.len(),
             ),
             (
                 "sets of doors that light passes",
@@ -558,13 +559,15 @@ impl Frame {
 
     /// Coefficients b: block by block, channel by channel.
     pub fn coefficients(&self) -> Vec<f32> {
-        let stride = self.layout.coefficient_stride;
+        let layout = &*self.layout;
         let mut out = Vec::new();
-        for &place in &self.layout.rank {
-            let modes = self.layout.modes[place as usize] as usize;
+        for &place in &layout.rank {
+            let place = place as usize;
+            let rows = &layout.row_of_mode[layout.shapes[place] as usize];
             for channel in 0..3 {
-                let start = (3 * place as usize + channel) * stride;
-                out.extend_from_slice(&self.coefficients[start..start + modes]);
+                let start = (3 * place + channel) * layout.rows;
+                let of_block = &self.coefficients[start..start + layout.rows];
+                out.extend(rows.iter().map(|&row| of_block[usize::from(row)]));
             }
         }
         out

@@ -14,26 +14,27 @@ pub use shape::{Group, PackedShape, RowTile, Tiled};
 pub use transport::{PackedTransport, TransportEntry, TransportPacker, TransportTile};
 
 use half::f16;
+use mrt_core::simd::Aligned;
 use mrt_core::storage::Storage;
 
 /// Packed numbers.
 #[derive(Clone, Debug)]
 pub enum Values {
     /// As they are.
-    F32(Vec<f32>),
+    F32(Aligned<f32>),
     /// Bits of half-precision numbers, to be multiplied by a scale.
-    F16(Vec<u16>),
+    F16(Aligned<u16>),
     /// Integers, to be multiplied by a scale.
-    Int8(Vec<i8>),
+    Int8(Aligned<i8>),
 }
 
 impl Values {
     /// None yet.
     pub(crate) fn new(storage: Storage) -> Self {
         match storage {
-            Storage::F32 => Values::F32(Vec::new()),
-            Storage::F16 => Values::F16(Vec::new()),
-            Storage::Int8 => Values::Int8(Vec::new()),
+            Storage::F32 => Values::F32(Aligned::new()),
+            Storage::F16 => Values::F16(Aligned::new()),
+            Storage::Int8 => Values::Int8(Aligned::new()),
         }
     }
 
@@ -54,9 +55,9 @@ impl Values {
     /// Their bytes.
     pub fn bytes(&self) -> usize {
         match self {
-            Values::F32(v) => size_of_val(v.as_slice()),
-            Values::F16(v) => size_of_val(v.as_slice()),
-            Values::Int8(v) => size_of_val(v.as_slice()),
+            Values::F32(v) => size_of_val(&**v),
+            Values::F16(v) => size_of_val(&**v),
+            Values::Int8(v) => size_of_val(&**v),
         }
     }
 
@@ -66,6 +67,15 @@ impl Values {
             Values::F32(v) => v.push(value),
             Values::F16(v) => v.push(f16::from_f32_const(value / scale).to_bits()),
             Values::Int8(v) => v.push((value / scale).round().clamp(-127.0, 127.0) as i8),
+        }
+    }
+
+    /// Appends zeros until the next number begins a cache line.
+    pub(crate) fn fill_line(&mut self) {
+        match self {
+            Values::F32(v) => v.fill_line(),
+            Values::F16(v) => v.fill_line(),
+            Values::Int8(v) => v.fill_line(),
         }
     }
 

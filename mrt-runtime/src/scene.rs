@@ -8,6 +8,7 @@ use crate::wall::UnitFromWorld;
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::cube::{CubeRotation, Face};
 use mrt_core::hexahedron::Hexahedron;
+use mrt_core::simd::Aligned;
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -185,12 +186,11 @@ pub struct Layout {
     pub shapes: Vec<u32>,
     /// By shape: the slot of each texel, within the block.
     pub slot_of_texel: Vec<Vec<u32>>,
-    /// Coefficients b that there is place for in every block, a channel.
-    pub coefficient_stride: usize,
-    /// The same of joint coefficients.
-    pub joint_stride: usize,
-    /// By place: number of coefficients b.
-    pub modes: Vec<u32>,
+    /// Coefficients that there is place for in every block, a channel: those of the shape with the most
+    /// [`rows`](crate::packed::PackedShape::rows), and some more that are zero.
+    pub rows: usize,
+    /// By shape: the row of each coefficient b.
+    pub row_of_mode: Vec<Vec<u16>>,
 }
 
 impl Layout {
@@ -227,7 +227,7 @@ impl Layout {
 /// Three numbers a slot, channels apart.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planes {
-    values: Vec<f32>,
+    values: Aligned<f32>,
     slots: usize,
 }
 
@@ -235,7 +235,7 @@ impl Planes {
     /// Zeros.
     pub(crate) fn new(slots: usize) -> Self {
         Self {
-            values: vec![0.0; 3 * slots],
+            values: Aligned::zeroed(3 * slots),
             slots,
         }
     }

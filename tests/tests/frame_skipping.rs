@@ -321,6 +321,88 @@ fn doors_move_for_versioned_openings_too() {
     }
 }
 
+/// With a tolerance, blocks keep light that one of several lamps hardly changes, in lightmap and probes, err by no more than
+/// is stated, and are dark once the lamps are out.
+#[test]
+fn light_that_hardly_changes_is_kept() {
+    const ALBEDO: f32 = 0.7;
+    let level = maze(41, Vec3::splat(ALBEDO), 7);
+    let scene = mobile(&level);
+    let lamp = |block: usize| {
+        let middle = level.blocks[block].warp.center().as_vec3();
+        sphere(middle + Vec3::new(0.1, 0.2, -0.15), 0.1, Vec3::ONE)
+    };
+    let mut lights = [5, 15, 25, 35].map(lamp);
+    let outputs = Outputs {
+        probes: Some(ProbeOrder::L2),
+        ..Outputs::default()
+    };
+    let apart = |found: &[f32], expected: &[f32]| {
+        let pairs = found.iter().zip(expected);
+        pairs.fold(0.0f32, |m, (a, b)| m.max((a - b).abs()))
+    };
+    for (bounces, passed_on) in [
+        (Bounces::Count(1), 1.0 + ALBEDO),
+        (Bounces::Feedback, (1.0 + ALBEDO) / (1.0 - ALBEDO)),
+    ] {
+        let solve = |frame: &mut Frame, lights: &[Light]| {
+            assert_eq!(frame.solve(&scene, lights, &Openings, bounces), Ok(()));
+        };
+        let mut exact = Frame::with_outputs(&scene, outputs);
+        solve(&mut exact, &lights);
+        let brightest = exact.indirect().into_iter().fold(0.0, f32::max);
+        let config = FrameConfig {
+            outputs,
+            tolerance: 1e-3 * brightest,
+            ..FrameConfig::default()
+        };
+        let stated = config.tolerance * passed_on + 1e-6 * brightest;
+        let mut frame = Frame::with_config(&scene, config);
+        solve(&mut frame, &lights);
+        let (mut targets, mut kept, mut all) = (0, 0, 0);
+        for step in 0..50 {
+            if let Light::Sphere { position, .. } = &mut lights[0] {
+                position.x += if step % 2 == 0 { 0.01 } else { -0.01 };
+            }
+            solve(&mut frame, &lights);
+            solve(&mut exact, &lights);
+            targets += frame.work().targets;
+            kept += frame.work().kept;
+            all += exact.work().targets;
+            let walls = apart(&frame.indirect(), &exact.indirect());
+            let lightmap = apart(
+                frame.lightmap().as_flattened(),
+                exact.lightmap().as_flattened(),
+            );
+            assert!(
+                walls <= stated && lightmap <= stated,
+                "{bounces:?}, frame {step}: {walls} and {lightmap} of {stated}"
+            );
+            let probes = |frame: &Frame| {
+                let probes = frame.probes().expect("they were asked for");
+                probes.values().as_flattened().to_vec()
+            };
+            // Turning five coefficients to the world may add their errors up, as lengths are.
+            let in_probes = apart(&probes(&frame), &probes(&exact));
+            assert!(
+                in_probes <= 5f32.sqrt() * stated,
+                "{bounces:?}: {in_probes}"
+            );
+        }
+        println!("{bounces:?}: {targets} targets and {kept} kept, of {all}");
+        assert!(kept > 0 && targets < all);
+        // Feedback takes as many frames as it has bounces to see.
+        for _ in 0..100 {
+            solve(&mut frame, &[]);
+        }
+        let left = frame.indirect().into_iter().fold(0.0, f32::max);
+        assert!(left <= stated, "{bounces:?}: {left}");
+        if bounces == Bounces::Count(1) {
+            assert_eq!(left, 0.0);
+        }
+    }
+}
+
 /// Beams have room for about twelve lights a block; beyond that, texels ask for each light.
 #[test]
 fn more_beams_than_there_is_room_for_come_and_go() {

@@ -65,6 +65,8 @@ pub trait Lanes: Copy + Debug + Send + Sync + 'static {
     fn keep_where_ge(self, a: Self::V, b: Self::V, x: Self::V) -> Self::V;
     /// Sum of the lanes, in an order that depends on the level alone.
     fn sum(self, a: Self::V) -> f32;
+    /// [`Lanes::sum`] of four vectors, added up in another order.
+    fn sum_four(self, v: [Self::V; 4]) -> [f32; 4];
     /// The largest lane; no lane is NaN.
     fn largest(self, a: Self::V) -> f32;
 }
@@ -145,6 +147,10 @@ impl Lanes for Scalar {
     #[inline(always)]
     fn sum(self, a: f32) -> f32 {
         a
+    }
+    #[inline(always)]
+    fn sum_four(self, v: [f32; 4]) -> [f32; 4] {
+        v
     }
     #[inline(always)]
     fn largest(self, a: f32) -> f32 {

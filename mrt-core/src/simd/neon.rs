@@ -6,8 +6,9 @@
 )]
 
 use super::Kernel;
-use super::lanes::{F16_EXPONENT, Lanes};
+use super::lanes::Lanes;
 use std::arch::aarch64::*;
+use std::arch::asm;
 
 /// Proof of NEON.
 #[derive(Clone, Copy, Debug)]
@@ -47,12 +48,16 @@ impl Lanes for Neon {
     fn load_f16(self, from: &[u16]) -> float32x4_t {
         let from = &from[..4];
         unsafe {
-            // As `f32_from_f16_bits`: the conversion instruction's type is newer than the Rust that this needs.
-            let wide = vmovl_u16(vld1_u16(from.as_ptr()));
-            let sign = vshlq_n_u32::<16>(vandq_u32(wide, vdupq_n_u32(0x8000)));
-            let rest = vshlq_n_u32::<13>(vandq_u32(wide, vdupq_n_u32(0x7fff)));
-            let magnitude = vmulq_f32(vreinterpretq_f32_u32(rest), vdupq_n_f32(F16_EXPONENT));
-            vreinterpretq_f32_u32(vorrq_u32(vreinterpretq_u32_f32(magnitude), sign))
+            let halves = vld1_u16(from.as_ptr());
+            let wide: float32x4_t;
+            // The intrinsic's type is newer than the Rust that this needs; the instruction is not.
+            asm!(
+                "fcvtl {wide:v}.4s, {halves:v}.4h",
+                wide = out(vreg) wide,
+                halves = in(vreg) halves,
+                options(pure, nomem, nostack, preserves_flags)
+            );
+            wide
         }
     }
     #[inline(always)]
@@ -112,6 +117,15 @@ impl Lanes for Neon {
             let pairs = vadd_f32(vget_low_f32(a), vget_high_f32(a));
             vget_lane_f32::<0>(pairs) + vget_lane_f32::<1>(pairs)
         }
+    }
+    #[inline(always)]
+    fn sum_four(self, [a, b, c, d]: [float32x4_t; 4]) -> [f32; 4] {
+        let mut sums = [0.0; 4];
+        unsafe {
+            let all = vpaddq_f32(vpaddq_f32(a, b), vpaddq_f32(c, d));
+            vst1q_f32(sums.as_mut_ptr(), all);
+        }
+        sums
     }
     #[inline(always)]
     fn largest(self, a: float32x4_t) -> f32 {

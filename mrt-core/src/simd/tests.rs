@@ -42,13 +42,21 @@ impl Kernel for Everything<'_> {
 struct Reductions<'a>(&'a [f32; 16]);
 
 impl Kernel for Reductions<'_> {
-    type Output = (f32, f32);
+    type Output = (f32, f32, [f32; 4]);
     #[inline(always)]
-    fn run<L: Lanes>(self, l: L) -> (f32, f32) {
+    fn run<L: Lanes>(self, l: L) -> Self::Output {
         let starts = || (0..16).step_by(L::N);
         let sum = starts().map(|at| l.sum(l.load(&self.0[at..]))).sum();
         let largest = starts().map(|at| l.largest(l.load(&self.0[at..])));
-        (sum, largest.fold(f32::MIN, f32::max))
+        let mut four = [0.0; 4];
+        for at in starts() {
+            let v = l.load(&self.0[at..]);
+            let scaled = [1.0, 2.0, 3.0, 4.0].map(|scale| l.mul(v, l.splat(scale)));
+            for (sum, more) in four.iter_mut().zip(l.sum_four(scaled)) {
+                *sum += more;
+            }
+        }
+        (sum, largest.fold(f32::MIN, f32::max), four)
     }
 }
 
@@ -77,8 +85,12 @@ fn every_operation_of_every_level_is_that_of_the_reference() {
                 k % 16
             );
         }
-        let (sum, largest) = level.run(Reductions(&a));
-        assert!((sum - a.iter().sum::<f32>()).abs() < 1e-4);
+        let (sum, largest, four) = level.run(Reductions(&a));
+        let exact = a.iter().sum::<f32>();
+        assert!((sum - exact).abs() < 1e-4);
+        for (sum, scale) in four.iter().zip([1.0, 2.0, 3.0, 4.0]) {
+            assert!((sum - scale * exact).abs() < 4e-4, "{level:?}: {four:?}");
+        }
         assert_eq!(largest, a[15]);
     }
 }
@@ -168,10 +180,10 @@ struct Dot<'a> {
 }
 
 impl Kernel for Dot<'_> {
-    type Output = [[f32; 3]; tiles::DOT_ROWS];
+    type Output = [[f32; rows::DOT_ROWS]; 3];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
-        tiles::dot_rows(l, self.rows, self.x)
+        rows::dot_rows(l, self.rows, self.x)
     }
 }
 
@@ -225,11 +237,47 @@ fn dot_products_are_those_of_the_reference() {
     for (count, level) in cases {
         let rows = &all[..count * 80];
         let found = level.run(Dot { rows, x });
-        for (row, found) in found.iter().take(count).enumerate() {
-            for (channel, &found) in found.iter().enumerate() {
-                let products = rows[row * 80..].iter().zip(x[channel]);
+        for (channel, found) in found.iter().enumerate() {
+            for (row, &found) in found.iter().enumerate() {
+                let products = rows.get(row * 80..).into_iter().flatten().zip(x[channel]);
                 let sum: f64 = products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-                // Eighty numbers of size 1, in f32.
+                // Eighty numbers of size 1, in f32; nothing for rows that there are not.
+                assert!((f64::from(found) - sum).abs() < 2e-5, "{level:?}");
+            }
+        }
+    }
+}
+
+struct Unlike<'a> {
+    rows: &'a [f32],
+    x: &'a [f32],
+    starts: [usize; rows::DOT_ROWS],
+}
+
+impl Kernel for Unlike<'_> {
+    type Output = [[f32; rows::DOT_ROWS]; 3];
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> Self::Output {
+        rows::dot_unlike_rows(l, self.rows, self.x, self.starts, 80)
+    }
+}
+
+#[test]
+fn rows_with_vectors_of_their_own_are_those_of_the_reference() {
+    let (rows, x) = (numbers(4 * 80), numbers(6 * 80));
+    let starts = [240, 0, 16, 240];
+    for level in SimdLevel::available() {
+        let found = level.run(Unlike {
+            rows: &rows,
+            x: &x,
+            starts,
+        });
+        for (channel, found) in found.iter().enumerate() {
+            for (row, &found) in found.iter().enumerate() {
+                let x = &x[starts[row] + channel * 80..];
+                let products = rows[row * 80..(row + 1) * 80].iter().zip(x);
+                let sum: f64 = products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                // As above.
                 assert!((f64::from(found) - sum).abs() < 2e-5, "{level:?}");
             }
         }

@@ -1,8 +1,7 @@
 //! Products of small matrices with three right-hand sides: red, green and blue.
 //!
-//! A matrix with many rows is packed in **tiles** of [`TILE`] rows (or half as many), column after column, and a product
-//! keeps a tile's sums in registers while it runs through the columns. One with many columns and few rows is packed row
-//! by row, and a product keeps a sum of vectors for each row and channel.
+//! A matrix is packed in **tiles** of [`TILE`] rows (or half as many), column after column, and a product keeps a tile's
+//! sums in registers while it runs through the columns. Where there are few rows, [`rows`](super::rows) is faster.
 //!
 //! Functions here are parts of kernels: inlined into them, they get the instructions of their lanes.
 
@@ -62,8 +61,8 @@ impl Element for i8 {
 /// Right-hand sides: number k of the channels is `values[k]`, `values[k + stride]` and `values[k + 2 stride]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Rgb<'a> {
-    values: &'a [f32],
-    stride: usize,
+    pub(super) values: &'a [f32],
+    pub(super) stride: usize,
 }
 
 impl<'a> Rgb<'a> {
@@ -74,7 +73,7 @@ impl<'a> Rgb<'a> {
 
     /// Whether every index below `limit` has its three numbers.
     #[inline(always)]
-    fn has(&self, limit: usize) -> bool {
+    pub(super) fn has(&self, limit: usize) -> bool {
         limit == 0 || limit + (CHANNELS - 1) * self.stride <= self.values.len()
     }
 }
@@ -206,133 +205,6 @@ pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [Ti
     }
 }
 
-/// A matrix of many tiles, all with the same columns, times the three vectors of one block or of two. Each `out` has as
-/// many numbers a channel as the matrix has rows. Sums are taken column by column, so that two blocks at once, which
-/// need the matrix loaded once, get the same bits as one after the other.
-///
-/// # Panics
-/// If the rows are not whole tiles, there are not as many numbers as columns times rows, or an `x` is shorter than any
-/// of the lists of columns allows.
-#[inline(always)]
-pub fn multiply_tiles<L: Lanes, E: Element, const BLOCKS: usize>(
-    l: L,
-    tiles: &[E],
-    columns: Columns<'_>,
-    x: [Rgb<'_>; BLOCKS],
-    mut out: [TileOut<'_>; BLOCKS],
-) {
-    let size = TILE * columns.indices.len();
-    let rows = out[0][0].len();
-    assert!(rows.is_multiple_of(TILE) && tiles.len() == rows / TILE * size);
-    for (x, out) in x.iter().zip(&out) {
-        assert!(x.has(columns.limit));
-        assert!(out.iter().all(|channel| channel.len() == rows));
-    }
-    let mut row = 0;
-    while row < rows {
-        let start = row / TILE * size;
-        // SAFETY: row + TILE <= rows, the length of each channel, and the tile ends within the tiles; where there are two
-        // tiles left, that holds for the second too.
-        unsafe {
-            let here = tiles.get_unchecked(start..start + size);
-            let two = row + 2 * TILE <= rows;
-            match (L::N, BLOCKS) {
-                (8, 1) if two => {
-                    let panels = [here, tiles.get_unchecked(start + size..start + 2 * size)];
-                    multiply_panels::<L, E, 2, 2, BLOCKS>(l, panels, columns, x, &mut out, row);
-                    row += TILE;
-                }
-                (16, _) if two => {
-                    let panels = [here, tiles.get_unchecked(start + size..start + 2 * size)];
-                    multiply_panels::<L, E, 2, 1, BLOCKS>(l, panels, columns, x, &mut out, row);
-                    row += TILE;
-                }
-                (8, _) => {
-                    multiply_panels::<L, E, 1, 2, BLOCKS>(l, [here], columns, x, &mut out, row);
-                }
-                (16, _) => {
-                    multiply_panels::<L, E, 1, 1, BLOCKS>(l, [here], columns, x, &mut out, row);
-                }
-                (4, _) => {
-                    // Four lanes have no registers for two blocks.
-                    for (x, out) in x.iter().zip(&mut out) {
-                        let (x, out) = ([*x], std::slice::from_mut(out));
-                        multiply_panels::<L, E, 1, 4, 1>(l, [here], columns, x, out, row);
-                    }
-                }
-                _ => {
-                    for (x, [red, green, blue]) in x.iter().zip(&mut out) {
-                        let term = Term {
-                            panels: [here],
-                            columns,
-                            x: *x,
-                            scales: &[],
-                        };
-                        let out = [&mut red[row..], &mut green[row..], &mut blue[row..]];
-                        sum_rows_one_by_one::<L, E, TILE>(l, std::iter::once(term), out);
-                    }
-                }
-            }
-        }
-        row += TILE;
-    }
-}
-
-/// One tile of each panel, the first from row `row` of `out` on.
-///
-/// # Safety
-/// Each panel has a tile of numbers for each column, each `x` three numbers for each, each channel of `out` a tile for each
-/// panel from `row` on, and `VECTORS` vectors make a tile.
-#[inline(always)]
-unsafe fn multiply_panels<
-    L: Lanes,
-    E: Element,
-    const PANELS: usize,
-    const VECTORS: usize,
-    const BLOCKS: usize,
->(
-    l: L,
-    panels: [&[E]; PANELS],
-    columns: Columns<'_>,
-    x: [Rgb<'_>; BLOCKS],
-    out: &mut [TileOut<'_>],
-    row: usize,
-) {
-    let mut acc = [[[[l.splat(0.0); VECTORS]; PANELS]; CHANNELS]; BLOCKS];
-    for k in 0..columns.indices.len() {
-        // SAFETY, of the whole loop: the caller's promises.
-        let column = unsafe { *columns.indices.get_unchecked(k) } as usize;
-        let mut a = [[l.splat(0.0); VECTORS]; PANELS];
-        for (a, panel) in a.iter_mut().zip(&panels) {
-            for (v, a) in a.iter_mut().enumerate() {
-                let at = k * TILE + v * L::N;
-                *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
-            }
-        }
-        for (acc, x) in acc.iter_mut().zip(&x) {
-            for (channel, acc) in acc.iter_mut().enumerate() {
-                let x = unsafe { *x.values.get_unchecked(channel * x.stride + column) };
-                let x = l.splat(x);
-                for (acc, a) in acc.iter_mut().zip(&a) {
-                    for (acc, &a) in acc.iter_mut().zip(a) {
-                        *acc = l.mul_add(a, x, *acc);
-                    }
-                }
-            }
-        }
-    }
-    for (acc, out) in acc.iter().zip(out) {
-        for (acc, out) in acc.iter().zip(out.iter_mut()) {
-            for (panel, acc) in acc.iter().enumerate() {
-                for (v, &acc) in acc.iter().enumerate() {
-                    // SAFETY: the caller's promises.
-                    unsafe { l.store_unchecked(out, row + panel * TILE + v * L::N, acc) };
-                }
-            }
-        }
-    }
-}
-
 /// [`sum_tile`] for a tile of [`HALF_TILE`] rows.
 ///
 /// # Panics
@@ -346,6 +218,8 @@ pub fn sum_half_tile<'a, L: Lanes, E: Element>(
     let l = l.narrow();
     match <L::Narrow as Lanes>::N {
         4 => sum_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, [sums]),
+        // As above.
+        8 if E::CONVERTED => sum_rows::<_, E, 1, 1, 3, HALF_TILE>(l, terms, [sums]),
         8 => sum_rows::<_, E, 1, 1, 4, HALF_TILE>(l, terms, [sums]),
         _ => sum_rows_one_by_one::<_, E, HALF_TILE>(l, terms, sums),
     }
@@ -537,90 +411,46 @@ fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
     }
 }
 
-/// Rows of a group in [`dot_rows`], at most.
-pub const DOT_ROWS: usize = 4;
-
-/// Sums of up to [`DOT_ROWS`] rows of numbers times three vectors: `out[row][channel]`.
-///
-/// `rows` holds row after row, each as long as a vector; lengths are multiples of [`WIDEST`](super::WIDEST).
+/// `to = sums * scale * factors + own`: the numbers of a tile or half tile, one channel.
 ///
 /// # Panics
-/// If `rows` is not 1 to [`DOT_ROWS`] times as long as a vector, or that length is no multiple of the lanes.
+/// If `factors`, `own` and `to` are not of one length, that is [`TILE`] or [`HALF_TILE`].
 #[inline(always)]
-pub fn dot_rows<L: Lanes, E: Element>(
+pub fn finish_tile<L: Lanes>(
     l: L,
-    rows: &[E],
-    x: [&[f32]; CHANNELS],
-) -> [[f32; CHANNELS]; DOT_ROWS] {
-    match rows.len() / x[0].len().max(1) {
-        1 => dot_some_rows::<L, E, 1, 4>(l, rows, x),
-        2 => dot_some_rows::<L, E, 2, 2>(l, rows, x),
-        3 => dot_some_rows::<L, E, 3, 1>(l, rows, x),
-        _ => dot_some_rows::<L, E, 4, 1>(l, rows, x),
-    }
-}
-
-/// `SETS` vectors of each row go to sums of their own, so that enough products are under way at once.
-#[inline(always)]
-fn dot_some_rows<L: Lanes, E: Element, const ROWS: usize, const SETS: usize>(
-    l: L,
-    rows: &[E],
-    x: [&[f32]; CHANNELS],
-) -> [[f32; CHANNELS]; DOT_ROWS] {
-    let length = x[0].len();
-    assert!(x.iter().all(|x| x.len() == length) && length.is_multiple_of(L::N));
-    assert_eq!(rows.len(), ROWS * length, "rows");
-    let mut acc = [[[l.splat(0.0); CHANNELS]; ROWS]; SETS];
-    let step = SETS * L::N;
-    let mut at = 0;
-    while at + step <= length {
-        for (set, acc) in acc.iter_mut().enumerate() {
-            // SAFETY: at + step <= length.
-            unsafe { dot_vector(l, rows, x, length, at + set * L::N, acc) };
-        }
-        at += step;
-    }
-    while at < length {
-        // SAFETY: at + N <= length, since the length is a multiple of N.
-        unsafe { dot_vector(l, rows, x, length, at, &mut acc[0]) };
-        at += L::N;
-    }
-    let mut sums = [[0.0; CHANNELS]; DOT_ROWS];
-    for (row, sums) in sums.iter_mut().take(ROWS).enumerate() {
-        for (channel, sum) in sums.iter_mut().enumerate() {
-            let mut all = acc[0][row][channel];
-            for other in &acc[1..] {
-                all = l.add(all, other[row][channel]);
-            }
-            *sum = l.sum(all);
-        }
-    }
-    sums
-}
-
-/// `acc += rows[at..] * x[at..]`, one vector of each row.
-///
-/// # Safety
-/// Each vector of `x` has `length` numbers, `rows` that many for each row, and `at + N <= length`.
-#[inline(always)]
-unsafe fn dot_vector<L: Lanes, E: Element, const ROWS: usize>(
-    l: L,
-    rows: &[E],
-    x: [&[f32]; CHANNELS],
-    length: usize,
-    at: usize,
-    acc: &mut [[L::V; CHANNELS]; ROWS],
+    sums: &[f32; TILE],
+    scale: f32,
+    factors: &[f32],
+    own: &[f32],
+    to: &mut [f32],
 ) {
-    let mut signal = [l.splat(0.0); CHANNELS];
-    for (signal, x) in signal.iter_mut().zip(x) {
-        // SAFETY: the caller's promises; so below.
-        *signal = unsafe { l.load_unchecked(x, at) };
+    if to.len() == TILE {
+        finish_rows::<L, TILE>(l, sums, scale, factors, own, to);
+    } else {
+        finish_rows::<L::Narrow, HALF_TILE>(l.narrow(), sums, scale, factors, own, to);
     }
-    for (row, acc) in acc.iter_mut().enumerate() {
-        let start = row * length + at;
-        let a = E::load(l, unsafe { rows.get_unchecked(start..start + L::N) });
-        for (acc, &signal) in acc.iter_mut().zip(&signal) {
-            *acc = l.mul_add(a, signal, *acc);
+}
+
+#[inline(always)]
+fn finish_rows<L: Lanes, const ROWS: usize>(
+    l: L,
+    sums: &[f32; TILE],
+    scale: f32,
+    factors: &[f32],
+    own: &[f32],
+    to: &mut [f32],
+) {
+    assert!(factors.len() == ROWS && own.len() == ROWS && to.len() == ROWS);
+    let scale = l.splat(scale);
+    let mut at = 0;
+    while at < ROWS {
+        // SAFETY: at + N <= ROWS, the length of everything.
+        unsafe {
+            let factor = l.mul(scale, l.load_unchecked(factors, at));
+            let own = l.load_unchecked(own, at);
+            let sum = l.load_unchecked(sums, at);
+            l.store_unchecked(to, at, l.mul_add(sum, factor, own));
         }
+        at += L::N;
     }
 }

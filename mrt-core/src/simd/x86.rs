@@ -8,6 +8,7 @@
 use super::Kernel;
 use super::lanes::{F16_EXPONENT, Lanes};
 use std::arch::x86_64::*;
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Proof of SSE2.
 #[derive(Clone, Copy, Debug)]
@@ -17,18 +18,48 @@ pub struct Sse2(());
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
-/// Proof of AVX-512 F, and of what [`Avx2`] proves.
+/// Proof of AVX-512 F and VL, and of what [`Avx2`] proves.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(());
 
-pub(super) fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("fma")
-        && is_x86_feature_detected!("f16c")
+/// What the machine has: asked once, since kernels are many and short.
+static FOUND: AtomicU8 = AtomicU8::new(UNKNOWN);
+const UNKNOWN: u8 = 0;
+const BASELINE: u8 = 1;
+const AVX2: u8 = 2;
+const AVX512: u8 = 3;
+
+#[inline]
+fn found() -> u8 {
+    match FOUND.load(Ordering::Relaxed) {
+        UNKNOWN => ask(),
+        found => found,
+    }
 }
 
+#[cold]
+fn ask() -> u8 {
+    let avx2 = is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("f16c");
+    let avx512 = is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl");
+    let found = match (avx2, avx512) {
+        (false, _) => BASELINE,
+        (true, false) => AVX2,
+        (true, true) => AVX512,
+    };
+    FOUND.store(found, Ordering::Relaxed);
+    found
+}
+
+#[inline]
+pub(super) fn has_avx2() -> bool {
+    found() >= AVX2
+}
+
+#[inline]
 pub(super) fn has_avx512() -> bool {
-    has_avx2() && is_x86_feature_detected!("avx512f")
+    found() == AVX512
 }
 
 /// SSE2 belongs to x86-64.
@@ -43,13 +74,14 @@ pub(super) fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx2(()))
     }
     assert!(has_avx2());
-    // SAFETY: the machine has the instructions, as was just asked; the answer is cached, so asking costs a load.
+    // SAFETY: the machine has the instructions, as was just asked.
     unsafe { run(kernel) }
 }
 
 /// Call only where [`has_avx512`].
 pub(super) fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
-    #[target_feature(enable = "avx512f,avx2,fma,f16c")]
+    // With VL, kernels of eight lanes have all 32 registers too.
+    #[target_feature(enable = "avx512f,avx512vl,avx2,fma,f16c")]
     fn run<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx512(()))
     }
@@ -157,6 +189,18 @@ impl Lanes for Sse2 {
         }
     }
     #[inline(always)]
+    fn sum_four(self, [a, b, c, d]: [__m128; 4]) -> [f32; 4] {
+        let mut sums = [0.0; 4];
+        unsafe {
+            // Lanes 0 + 2 and 1 + 3 of a and b, of c and d.
+            let ab = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
+            let cd = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
+            let all = _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab));
+            _mm_storeu_ps(sums.as_mut_ptr(), all);
+        }
+        sums
+    }
+    #[inline(always)]
     fn largest(self, a: __m128) -> f32 {
         unsafe {
             let pairs = _mm_max_ps(a, _mm_movehl_ps(a, a));
@@ -252,6 +296,22 @@ impl Lanes for Avx2 {
         }
     }
     #[inline(always)]
+    fn sum_four(self, [a, b, c, d]: [__m256; 4]) -> [f32; 4] {
+        let mut sums = [0.0; 4];
+        unsafe {
+            // As with four lanes, in both halves at once.
+            let ab = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
+            let cd = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
+            let all = _mm256_add_ps(
+                _mm256_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                _mm256_shuffle_ps::<0b11_10_11_10>(ab, cd),
+            );
+            let all = _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps::<1>(all));
+            _mm_storeu_ps(sums.as_mut_ptr(), all);
+        }
+        sums
+    }
+    #[inline(always)]
     fn largest(self, a: __m256) -> f32 {
         unsafe {
             let half = _mm_max_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
@@ -345,6 +405,24 @@ impl Lanes for Avx512 {
             let high = _mm512_castps512_ps256(_mm512_shuffle_f32x4::<0b01_00_11_10>(a, a));
             Avx2(()).sum(_mm256_add_ps(low, high))
         }
+    }
+    #[inline(always)]
+    fn sum_four(self, [a, b, c, d]: [__m512; 4]) -> [f32; 4] {
+        let mut sums = [0.0; 4];
+        unsafe {
+            // As with four lanes, in all quarters at once.
+            let ab = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
+            let cd = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
+            let all = _mm512_add_ps(
+                _mm512_shuffle_ps::<0b01_00_01_00>(ab, cd),
+                _mm512_shuffle_ps::<0b11_10_11_10>(ab, cd),
+            );
+            let high = _mm512_shuffle_f32x4::<0b01_00_11_10>(all, all);
+            let all = _mm256_add_ps(_mm512_castps512_ps256(all), _mm512_castps512_ps256(high));
+            let all = _mm_add_ps(_mm256_castps256_ps128(all), _mm256_extractf128_ps::<1>(all));
+            _mm_storeu_ps(sums.as_mut_ptr(), all);
+        }
+        sums
     }
     #[inline(always)]
     fn largest(self, a: __m512) -> f32 {

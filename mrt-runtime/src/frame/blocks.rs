@@ -50,6 +50,10 @@ pub(super) struct BlockState {
     pub arrived: Flux,
     /// Largest indirect irradiance.
     pub peak: f32,
+    /// Its light may differ by so much, W/m², from what joint coefficients now are.
+    pub lag: f32,
+    /// The joint coefficients of the pass under way are kept as they were.
+    pub is_kept: bool,
     /// What the pass under way found.
     pub arrives: Arrived,
     pub is_alive: bool,

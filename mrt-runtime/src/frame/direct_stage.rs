@@ -9,7 +9,7 @@ use crate::light::PlacedLight;
 use crate::scene::Scene;
 use crate::visibility::{Receiver, Visibility};
 use glam::Vec3;
-use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 use std::collections::VecDeque;
 use std::ops::Range;
 
@@ -52,7 +52,7 @@ pub(super) struct DirectStage {
     list: Vec<u32>,
     found: Vec<Found>,
     /// New irradiance of a block, by task.
-    scratch: Vec<Vec<f32>>,
+    scratch: Vec<Aligned<f32>>,
 }
 
 /// Where direct light came from.
@@ -93,7 +93,7 @@ impl DirectStage {
             is_waiting: vec![false; blocks],
             list: Vec::with_capacity(blocks),
             found: vec![Found::default(); blocks],
-            scratch: vec![vec![0.0; 3 * slots]; tasks],
+            scratch: vec![Aligned::zeroed(3 * slots); tasks],
         }
     }
 

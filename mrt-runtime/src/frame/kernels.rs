@@ -2,29 +2,33 @@
 
 use crate::packed::{PackedShape, PackedTransport, TransportEntry, Values};
 use glam::Vec3;
-use mrt_core::simd::folded::{Albedo, Reflected, Unfolded, fold, unfold};
+use mrt_core::simd::folded::{Albedo, Basis, Reflected, fold, unfold};
+use mrt_core::simd::rows::{DOT_ROWS, dot_rows, dot_unlike_rows};
 use mrt_core::simd::tiles::{
-    CHANNELS, Element, Rgb, TILE, Term, dot_rows, multiply_tiles, sum_half_tile, sum_tile,
+    CHANNELS, Element, HALF_TILE, Rgb, TILE, Term, finish_tile, sum_half_tile, sum_tile,
     sum_two_tiles,
 };
-use mrt_core::simd::{Kernel, Lanes, WIDEST};
+use mrt_core::simd::{Aligned, Kernel, Lanes, WIDEST};
 use std::ops::Range;
 
 /// What kernels of one task write on the way.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// A block's radiosity by class, in that by channel; or the irradiance of two.
-    folded: Vec<f32>,
+    /// A block's radiosity by class, in that by channel.
+    folded: Aligned<f32>,
     /// Coefficients times scales.
-    scaled: Vec<f32>,
+    scaled: Aligned<f32>,
+    /// Joint coefficients of a block.
+    pub(super) joint: Aligned<f32>,
 }
 
 impl Scratch {
-    /// For blocks of so many slots, and so many coefficients a channel.
+    /// For blocks of so many slots and coefficients.
     pub(super) fn new(slots: usize, coefficients: usize) -> Self {
         Self {
-            folded: vec![0.0; 2 * CHANNELS * slots],
-            scaled: vec![0.0; 2 * CHANNELS * coefficients],
+            folded: Aligned::zeroed(CHANNELS * slots),
+            scaled: Aligned::zeroed(coefficients),
+            joint: Aligned::zeroed(coefficients),
         }
     }
 }
@@ -42,7 +46,7 @@ pub(super) struct CoefficientsOf<'a> {
     pub uniform: Option<Vec3>,
     pub emission: Option<[&'a [f32]; CHANNELS]>,
     pub scratch: &'a mut Scratch,
-    /// Channel by channel.
+    /// Channel by channel; numbers at rows that belong to none of them are zero, and stay so.
     pub coefficients: &'a mut [f32],
 }
 
@@ -66,7 +70,7 @@ impl Kernel for CoefficientsOf<'_> {
             2 => fold_block::<L, 4>(l, &mut self),
             _ => fold_block::<L, 8>(l, &mut self),
         };
-        match &self.shape.rows {
+        match &self.shape.from_direct {
             Values::F32(rows) => coefficients(l, rows, &mut self),
             Values::F16(rows) => coefficients(l, rows, &mut self),
             Values::Int8(rows) => coefficients(l, rows, &mut self),
@@ -75,24 +79,37 @@ impl Kernel for CoefficientsOf<'_> {
     }
 }
 
+impl CoefficientsOf<'_> {
+    /// The albedo that sums are multiplied by, instead of each texel's light.
+    #[inline(always)]
+    fn later(&self) -> Option<[f32; CHANNELS]> {
+        match (self.uniform, self.emission) {
+            (Some(albedo), None) => Some(albedo.to_array()),
+            _ => None,
+        }
+    }
+}
+
 #[inline(always)]
 fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>) -> Sent {
-    let weight = &block.shape.folding.weight[..];
-    let stride = weight.len();
+    let later = block.later();
+    let light = Reflected {
+        direct: block.direct,
+        indirect: block.indirect,
+        albedo: match (later, block.uniform) {
+            (Some(_), _) => Albedo::Later,
+            (None, Some(albedo)) => Albedo::Uniform(albedo.to_array()),
+            (None, None) => Albedo::Each(block.albedo),
+        },
+        emission: block.emission,
+    };
+    let weight = &block.shape.folding.weight;
+    let sums = fold::<L, GROUP>(l, light, weight, &mut block.scratch.folded);
     let mut sent = Sent::default();
     for channel in 0..CHANNELS {
-        let light = Reflected {
-            direct: block.direct[channel],
-            indirect: block.indirect.map(|i| i[channel]),
-            albedo: match block.uniform {
-                Some(albedo) => Albedo::Uniform(albedo[channel]),
-                None => Albedo::Each(block.albedo[channel]),
-            },
-            emission: block.emission.map(|e| e[channel]),
-        };
-        let folded = &mut block.scratch.folded[channel * stride..];
-        let sums = fold::<L, GROUP>(l, light, weight, folded, CHANNELS * stride);
-        (sent.all[channel], sent.fresh[channel]) = (f64::from(sums[0]), f64::from(sums[1]));
+        let albedo = later.map_or(1.0, |albedo| f64::from(albedo[channel]));
+        sent.all[channel] = albedo * f64::from(sums.all[channel]);
+        sent.fresh[channel] = albedo * f64::from(sums.fresh[channel]);
     }
     sent
 }
@@ -101,22 +118,36 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
 fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
     let stride = block.shape.folding.stride;
     let place = block.coefficients.len() / CHANNELS;
+    let albedo = block.later().unwrap_or([1.0; CHANNELS]);
+    let folded = &block.scratch.folded[..];
     let mut start = 0;
     for group in &block.shape.groups {
         let end = start + usize::from(group.count) * stride;
-        let rows = &rows[std::mem::replace(&mut start, end)..end];
-        let class = usize::from(group.class) * CHANNELS * stride;
-        let folded = &block.scratch.folded[class..class + CHANNELS * stride];
-        let x = [
-            &folded[..stride],
-            &folded[stride..2 * stride],
-            &folded[2 * stride..],
-        ];
-        let sums = dot_rows(l, rows, x);
-        for (row, sums) in sums.iter().take(usize::from(group.count)).enumerate() {
-            for (channel, sum) in sums.iter().enumerate() {
-                let at = channel * place + usize::from(group.modes[row]);
-                block.coefficients[at] = sum * group.scales[row];
+        let numbers = &rows[std::mem::replace(&mut start, end)..end];
+        let of_class = |class: u8| usize::from(class) * CHANNELS * stride;
+        let sums = if group.is_mixed {
+            let starts = group.classes.map(of_class);
+            dot_unlike_rows(l, numbers, folded, starts, stride)
+        } else {
+            let folded = &folded[of_class(group.classes[0])..][..CHANNELS * stride];
+            let (red, rest) = folded.split_at(stride);
+            let (green, blue) = rest.split_at(stride);
+            dot_rows(l, numbers, [red, green, blue])
+        };
+        for (channel, sums) in sums.iter().enumerate() {
+            let mut scaled = [0.0; DOT_ROWS];
+            for (row, scaled) in scaled.iter_mut().enumerate() {
+                *scaled = sums[row] * (group.scales[row] * albedo[channel]);
+            }
+            let to = &mut block.coefficients[channel * place..(channel + 1) * place];
+            if group.is_mixed {
+                for (&row, scaled) in group.rows.iter().zip(scaled) {
+                    to[usize::from(row)] = scaled;
+                }
+            } else {
+                // A group of fewer rows writes zeros to those that follow; their own groups come later.
+                let first = usize::from(group.rows[0]);
+                to[first..first + DOT_ROWS].copy_from_slice(&scaled);
             }
         }
     }
@@ -139,15 +170,51 @@ pub(super) struct ResponsesOf<'a> {
     pub joint: &'a mut [f32],
 }
 
-/// Irradiance of one block, or of two of one shape, from their joint coefficients.
-pub(super) struct IndirectOf<'a, const BLOCKS: usize> {
+/// How much light may change where joint coefficients do.
+pub(super) struct ChangeOf<'a> {
     pub shape: &'a PackedShape,
-    pub joint: [&'a [f32]; BLOCKS],
+    /// Channel by channel, as many as there are rows or more.
+    pub before: &'a [f32],
+    pub now: &'a [f32],
+}
+
+impl Kernel for ChangeOf<'_> {
+    /// No number of light, whatever the texel and channel, changes by more.
+    type Output = f32;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) -> f32 {
+        let peaks = &self.shape.peaks[..];
+        let stride = self.now.len() / CHANNELS;
+        assert!(peaks.len().is_multiple_of(HALF_TILE) && peaks.len() <= stride);
+        assert_eq!(self.before.len(), self.now.len(), "joint coefficients");
+        // Rows come in eights.
+        let l = l.narrow();
+        let mut most = 0.0f32;
+        for channel in 0..CHANNELS {
+            let mut sum = l.splat(0.0);
+            let mut at = 0;
+            while at < peaks.len() {
+                let place = channel * stride + at;
+                let change = l.sub(l.load(&self.now[place..]), l.load(&self.before[place..]));
+                sum = l.mul_add(l.abs(change), l.load(&peaks[at..]), sum);
+                at += <L::Narrow as Lanes>::N;
+            }
+            most = most.max(l.sum(sum));
+        }
+        most
+    }
+}
+
+/// Irradiance of one block from its joint coefficients.
+pub(super) struct IndirectOf<'a> {
+    pub shape: &'a PackedShape,
+    pub joint: &'a [f32],
     pub scratch: &'a mut Scratch,
     /// Whether to find the largest change and irradiance; without, only whether there is light is known.
     pub compare: bool,
     /// Irradiance; what was there before is replaced.
-    pub indirect: [[&'a mut [f32]; CHANNELS]; BLOCKS],
+    pub indirect: [&'a mut [f32]; CHANNELS],
 }
 
 /// What arrived at a block's walls.
@@ -174,24 +241,24 @@ impl Kernel for ResponsesOf<'_> {
     }
 }
 
-impl<const BLOCKS: usize> Kernel for IndirectOf<'_, BLOCKS> {
-    type Output = [Arrived; BLOCKS];
+impl Kernel for IndirectOf<'_> {
+    type Output = Arrived;
 
     #[inline(always)]
-    fn run<L: Lanes>(mut self, l: L) -> [Arrived; BLOCKS] {
+    fn run<L: Lanes>(mut self, l: L) -> Arrived {
         match (&self.shape.joint, self.shape.folding.mirrors) {
-            (Values::F32(joint), 0) => expand::<L, f32, 1, BLOCKS>(l, joint, &mut self),
-            (Values::F32(joint), 1) => expand::<L, f32, 2, BLOCKS>(l, joint, &mut self),
-            (Values::F32(joint), 2) => expand::<L, f32, 4, BLOCKS>(l, joint, &mut self),
-            (Values::F32(joint), _) => expand::<L, f32, 8, BLOCKS>(l, joint, &mut self),
-            (Values::F16(joint), 0) => expand::<L, u16, 1, BLOCKS>(l, joint, &mut self),
-            (Values::F16(joint), 1) => expand::<L, u16, 2, BLOCKS>(l, joint, &mut self),
-            (Values::F16(joint), 2) => expand::<L, u16, 4, BLOCKS>(l, joint, &mut self),
-            (Values::F16(joint), _) => expand::<L, u16, 8, BLOCKS>(l, joint, &mut self),
-            (Values::Int8(joint), 0) => expand::<L, i8, 1, BLOCKS>(l, joint, &mut self),
-            (Values::Int8(joint), 1) => expand::<L, i8, 2, BLOCKS>(l, joint, &mut self),
-            (Values::Int8(joint), 2) => expand::<L, i8, 4, BLOCKS>(l, joint, &mut self),
-            (Values::Int8(joint), _) => expand::<L, i8, 8, BLOCKS>(l, joint, &mut self),
+            (Values::F32(joint), 0) => expand::<L, f32, 1>(l, joint, &mut self),
+            (Values::F32(joint), 1) => expand::<L, f32, 2>(l, joint, &mut self),
+            (Values::F32(joint), 2) => expand::<L, f32, 4>(l, joint, &mut self),
+            (Values::F32(joint), _) => expand::<L, f32, 8>(l, joint, &mut self),
+            (Values::F16(joint), 0) => expand::<L, u16, 1>(l, joint, &mut self),
+            (Values::F16(joint), 1) => expand::<L, u16, 2>(l, joint, &mut self),
+            (Values::F16(joint), 2) => expand::<L, u16, 4>(l, joint, &mut self),
+            (Values::F16(joint), _) => expand::<L, u16, 8>(l, joint, &mut self),
+            (Values::Int8(joint), 0) => expand::<L, i8, 1>(l, joint, &mut self),
+            (Values::Int8(joint), 1) => expand::<L, i8, 2>(l, joint, &mut self),
+            (Values::Int8(joint), 2) => expand::<L, i8, 4>(l, joint, &mut self),
+            (Values::Int8(joint), _) => expand::<L, i8, 8>(l, joint, &mut self),
         }
     }
 }
@@ -199,18 +266,17 @@ impl<const BLOCKS: usize> Kernel for IndirectOf<'_, BLOCKS> {
 #[inline(always)]
 fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
     let transport = block.transport;
-    let stride = block.coefficients.len() / block.has_coefficients.len().max(1);
-    let mode_stride = stride / CHANNELS;
-    let place = block.joint.len() / CHANNELS;
-    let own = &block.coefficients[block.block * stride..(block.block + 1) * stride];
+    let stride = block.joint.len() / CHANNELS;
+    let own = CHANNELS * stride * block.block;
+    let own = &block.coefficients[own..own + CHANNELS * stride];
+    let x = Rgb::new(block.coefficients, stride);
     let tiles = transport.tiles_of_block[block.block].clone();
     let tiles = &transport.tiles[tiles.start as usize..tiles.end as usize];
     for (tile, row_tile) in tiles.iter().zip(&block.shape.row_tiles) {
         let rows = usize::from(row_tile.height);
         let mut sums = [[0.0f32; TILE]; CHANNELS];
         let entries = &transport.entries[tile.entries.start as usize..tile.entries.end as usize];
-        // Gated ones come first.
-        let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
+        let gated = tile.gated as usize;
         let mut behind_doors = [[0.0f32; TILE]; CHANNELS];
         for entry in &entries[..gated] {
             let factor = block.gate_values[entry.gate as usize];
@@ -221,7 +287,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
             let term = Term {
                 panels: [&values[entry.start as usize..][..columns.len() * rows]],
                 columns: transport.columns.get(columns.clone()),
-                x: Rgb::new(block.coefficients, mode_stride),
+                x,
                 scales: transport.column_scales.get(columns).unwrap_or(&[]),
             };
             sum_terms(l, std::iter::once(term), rows, &mut sums);
@@ -238,7 +304,6 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
             has_coefficients: block.has_coefficients,
             all_lit: block.all_lit,
         };
-        let x = Rgb::new(block.coefficients, mode_stride);
         let lit = runs.map(|(columns, start)| Term {
             panels: [&values[start..start + columns.len() * rows]],
             columns: transport.columns.get(columns.clone()),
@@ -255,23 +320,15 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
                 *to += from;
             }
         }
-        let first = usize::from(row_tile.start);
-        let of_tile = first..first + usize::from(row_tile.count);
-        let modes = &block.shape.row_order[of_tile.clone()];
-        let inverses = &block.shape.row_inverses[of_tile];
+        // The first joint modes are the block's own.
+        let factors = &block.shape.row_inverses[row_tile.rows()];
         for (channel, sums) in sums.iter().enumerate() {
-            let joint = &mut block.joint[channel * place..(channel + 1) * place];
-            for ((&mode, inverse), sum) in modes.iter().zip(inverses).zip(sums) {
-                joint[usize::from(mode)] = sum * (tile.scale * inverse);
-            }
-        }
-    }
-    // The first joint modes are the block's own.
-    for channel in 0..CHANNELS {
-        let joint = &mut block.joint[channel * place..(channel + 1) * place];
-        let own = &own[channel * mode_stride..][..block.shape.modes];
-        for (joint, own) in joint.iter_mut().zip(own) {
-            *joint += own;
+            let first = channel * stride + usize::from(row_tile.start);
+            let (own, to) = (
+                &own[first..first + rows],
+                &mut block.joint[first..first + rows],
+            );
+            finish_tile(l, sums, tile.scale, factors, own, to);
         }
     }
 }
@@ -328,80 +385,40 @@ fn sum_terms<'a, L: Lanes, E: Element>(
 }
 
 #[inline(always)]
-fn expand<L: Lanes, E: Element, const GROUP: usize, const BLOCKS: usize>(
+fn expand<L: Lanes, E: Element, const GROUP: usize>(
     l: L,
     joint: &[E],
-    blocks: &mut IndirectOf<'_, BLOCKS>,
-) -> [Arrived; BLOCKS] {
-    let shape = blocks.shape;
-    let stride = shape.folding.stride;
-    let weight = &shape.folding.weight[..];
-    let place = blocks.joint[0].len();
-    let mut x = blocks.joint;
+    block: &mut IndirectOf<'_>,
+) -> Arrived {
+    let shape = block.shape;
+    let mut x = block.joint;
     if !shape.joint_scales.is_empty() {
-        let scaled = blocks.scratch.scaled.chunks_exact_mut(place);
-        for (x, scaled) in x.iter_mut().zip(scaled) {
-            scale_joint(&shape.joint_scales, x, scaled);
-            *x = scaled;
-        }
+        let scaled = &mut block.scratch.scaled[..x.len()];
+        scale_joint(&shape.joint_scales, x, scaled);
+        x = scaled;
     }
-    let mut coefficients = [Rgb::new(x[0], place / CHANNELS); BLOCKS];
-    for (coefficients, x) in coefficients.iter_mut().zip(x) {
-        *coefficients = Rgb::new(x, place / CHANNELS);
-    }
-    let mut start = 0;
-    for class in 0..GROUP {
-        let columns = shape.joint_columns.get(shape.joint_classes[class].clone());
-        let end = start + stride * columns.indices().len();
-        let tiles = &joint[std::mem::replace(&mut start, end)..end];
-        // Of each block all classes lie side by side, so that it unfolds from what it last wrote.
-        let half = GROUP * CHANNELS * stride;
-        let (first, second) = blocks.scratch.folded.split_at_mut(half);
-        let at = class * CHANNELS * stride..(class + 1) * CHANNELS * stride;
-        let first = channels(&mut first[at.clone()], stride);
-        if BLOCKS == 2 {
-            let second = channels(&mut second[at], stride);
-            let x = [coefficients[0], coefficients[1]];
-            multiply_tiles(l, tiles, columns, x, [first, second]);
-        } else {
-            multiply_tiles(l, tiles, columns, [coefficients[0]], [first]);
-        }
-    }
-    let mut arrived = [Arrived::default(); BLOCKS];
-    for (block, arrived) in arrived.iter_mut().enumerate() {
-        let folded = &blocks.scratch.folded[block * GROUP * CHANNELS * stride..];
-        let mut found = Unfolded::new(l);
-        let mut flux = [0.0; CHANNELS];
-        for (channel, flux) in flux.iter_mut().enumerate() {
-            let (folded, apart) = (&folded[channel * stride..], CHANNELS * stride);
-            let out = &mut *blocks.indirect[block][channel];
-            *flux = if blocks.compare {
-                unfold::<L, GROUP, true>(l, folded, apart, weight, out, &mut found)
-            } else {
-                unfold::<L, GROUP, false>(l, folded, apart, weight, out, &mut found)
-            };
-        }
-        let [change, peak] = if blocks.compare {
-            found.change_and_peak(l)
+    let x = Rgb::new(x, x.len() / CHANNELS);
+    let basis = Basis {
+        tiles: joint,
+        classes: &shape.joint_classes,
+        weight: &shape.folding.weight,
+    };
+    let found = if block.compare {
+        unfold::<L, E, GROUP, true>(l, basis, x, &mut block.indirect)
+    } else {
+        unfold::<L, E, GROUP, false>(l, basis, x, &mut block.indirect)
+    };
+    let [red, green, blue] = found.sums;
+    Arrived {
+        flux: [f64::from(red), f64::from(green), f64::from(blue)],
+        change: found.change,
+        peak: if block.compare {
+            found.peak
         } else {
             // Nobody asks but whether there is light.
-            [0.0, flux[0].max(flux[1]).max(flux[2])]
-        };
-        *arrived = Arrived {
-            flux: [f64::from(flux[0]), f64::from(flux[1]), f64::from(flux[2])],
-            change,
-            peak,
-        };
+            red.max(green).max(blue)
+        },
     }
-    arrived
-}
-
-/// Red, green and blue of numbers that lie channel by channel.
-#[inline(always)]
-fn channels(all: &mut [f32], stride: usize) -> [&mut [f32]; CHANNELS] {
-    let (red, rest) = all.split_at_mut(stride);
-    let (green, blue) = rest.split_at_mut(stride);
-    [red, green, blue]
 }
 
 /// Joint coefficients times the scales of a packed basis, by mode.

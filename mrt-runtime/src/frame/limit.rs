@@ -40,6 +40,9 @@ pub(super) fn limit_flux(
             let state = &blocks.state[block as usize];
             sent += state.sent[channel] + SPOT_GAIN * state.fresh[channel];
             arrived += state.arrived[channel];
+            // What arrived may be of joint coefficients that were more.
+            let shape = &scene.shapes[layout.shapes[block as usize] as usize];
+            sent += f64::from(state.lag * shape.area);
         }
         let most = &mut blocks.most_sent[channel];
         if nothing_waits {
@@ -63,8 +66,8 @@ pub(super) fn limit_flux(
             state.arrived[channel] *= scale;
             let plane = &mut indirect.channels_mut()[channel][layout.slots[place].clone()];
             plane.iter_mut().for_each(|e| *e *= scale as f32);
-            let start = (3 * place + channel) * layout.joint_stride;
-            let joint = &mut joint[start..start + layout.joint_stride];
+            let start = (3 * place + channel) * layout.rows;
+            let joint = &mut joint[start..start + layout.rows];
             joint.iter_mut().for_each(|c| *c *= scale as f32);
             blocks.mark_changed(block);
         }

@@ -1,7 +1,7 @@
 //! Bounces: which blocks take part, and the two stages of a pass over them.
 
 use super::blocks::{BlockState, Blocks};
-use super::kernels::{CoefficientsOf, IndirectOf, ResponsesOf, Scratch, Sent};
+use super::kernels::{ChangeOf, CoefficientsOf, IndirectOf, ResponsesOf, Scratch, Sent};
 use super::limit::limit_flux;
 use super::{Bounces, Frame, MAX_PASSES};
 use crate::executor::{run_parts, task_count};
@@ -141,8 +141,18 @@ impl Frame {
             blocks.targets.push(block);
         }
         blocks.targets.sort_unstable();
+        let keep_within = (goes_on && !all).then_some(tolerance);
+        self.update_responses(scene, keep_within);
+        let blocks = &mut self.blocks;
+        if keep_within.is_some() {
+            let state = &blocks.state;
+            let arrived = blocks.targets.len();
+            blocks
+                .targets
+                .retain(|&block| !state[block as usize].is_kept);
+            self.work.kept += arrived - blocks.targets.len();
+        }
         self.work.targets += blocks.targets.len();
-        self.update_responses(scene);
         let after_responses = Instant::now();
         self.update_indirect(scene);
         let blocks = &mut self.blocks;
@@ -193,7 +203,7 @@ impl Frame {
         let level = self.config.simd;
         let layout = &*self.layout;
         let (direct, indirect) = (&self.direct, &self.indirect);
-        let size = 3 * layout.coefficient_stride;
+        let size = 3 * layout.rows;
         let Blocks {
             sources,
             state,
@@ -251,36 +261,76 @@ impl Frame {
         });
     }
 
-    /// Joint coefficients of the targets.
-    fn update_responses(&mut self, scene: &Scene) {
+    /// Joint coefficients of the targets. Those that change light by no more than `keep_within` stay what they were.
+    fn update_responses(&mut self, scene: &Scene, keep_within: Option<f32>) {
         let executor = &*self.config.executor;
         let level = self.config.simd;
         let layout = &*self.layout;
         let (coefficients, gate_values) = (&self.coefficients, &self.gate_values);
-        let size = 3 * layout.joint_stride;
-        let (list, has_coefficients) = (&self.blocks.targets, &self.blocks.has_coefficients);
-        let all_lit = self.blocks.lit == has_coefficients.len();
-        let tasks = task_count(executor, list.len()).min(self.scratch.len());
+        let size = 3 * layout.rows;
+        let Blocks {
+            targets,
+            has_coefficients,
+            lit,
+            state,
+            ..
+        } = &mut self.blocks;
+        let has_coefficients = &*has_coefficients;
+        let all_lit = *lit == has_coefficients.len();
+        let (list, tasks) = (
+            &*targets,
+            task_count(executor, targets.len()).min(self.scratch.len()),
+        );
         let mut joint = Cut::new(&mut self.joint, size);
+        let mut state = Cut::new(state, 1);
+        let mut scratch = self.scratch.iter_mut();
         let parts = (0..tasks).map_while(|k| {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            Some((list, joint.take(span(list))))
+            let span = span(list);
+            Some((
+                list,
+                joint.take(span.clone()),
+                state.take(span),
+                scratch.next()?,
+            ))
         });
-        run_parts(executor, parts, |(list, joint): (&[u32], &mut [f32])| {
+        run_parts(executor, parts, |(list, joint, state, scratch)| {
             let first = span(list).start;
             for &block in list {
                 let place = block as usize;
                 let at = place - first;
-                level.run(ResponsesOf {
+                let shape = &scene.shapes[layout.shapes[place] as usize];
+                let kept = &mut joint[at * size..(at + 1) * size];
+                let state = &mut state[at];
+                let responses = |joint| ResponsesOf {
                     block: place,
-                    shape: &scene.shapes[layout.shapes[place] as usize],
+                    shape,
                     transport: &scene.transport,
                     coefficients,
                     has_coefficients,
                     all_lit,
                     gate_values,
-                    joint: &mut joint[at * size..(at + 1) * size],
+                    joint,
+                };
+                (state.is_kept, state.lag) = (false, 0.0);
+                let Some(most) = keep_within else {
+                    level.run(responses(kept));
+                    continue;
+                };
+                let now = &mut scratch.joint[..];
+                level.run(responses(&mut *now));
+                let change = level.run(ChangeOf {
+                    shape,
+                    before: kept,
+                    now,
                 });
+                // What goes dark goes dark.
+                let goes_dark = change > 0.0 && now.iter().all(|&r| r == 0.0);
+                if change <= most && !goes_dark {
+                    (state.is_kept, state.lag) = (true, change);
+                } else {
+                    kept.copy_from_slice(now);
+                }
             }
         });
     }
@@ -291,7 +341,7 @@ impl Frame {
         let level = self.config.simd;
         let layout = &*self.layout;
         let joint = &self.joint;
-        let size = 3 * layout.joint_stride;
+        let size = 3 * layout.rows;
         // After one bounce nobody asks what changed.
         let compare = self.blocks.kept != Kept::Once;
         let Blocks { targets, state, .. } = &mut self.blocks;
@@ -309,53 +359,20 @@ impl Frame {
             let (state, planes) = (state.take(span), planes.take(slots));
             Some((list, state, planes, scratch.next()?))
         });
-        run_parts(executor, parts, |(list, state, planes, scratch)| {
+        run_parts(executor, parts, |(list, state, mut planes, scratch)| {
             let first = span(list).start;
             let first_slot = layout.slots[first].start;
-            let [red, green, blue] = planes;
-            let mut rest = list;
-            while let Some((&block, after)) = rest.split_first() {
+            for &block in list {
                 let place = block as usize;
-                let shape = layout.shapes[place];
-                // Two blocks of one shape read its basis once.
-                let other = after.first().map(|&next| next as usize);
-                let other = other.filter(|&next| layout.shapes[next] == shape);
-                rest = &after[usize::from(other.is_some())..];
-                let shape = &scene.shapes[shape as usize];
-                let joint = |place: usize| &joint[place * size..(place + 1) * size];
-                let slots = |place: usize| {
-                    let slots = layout.slots[place].clone();
-                    slots.start - first_slot..slots.end - first_slot
-                };
-                let Some(other) = other else {
-                    let out = [&mut *red, &mut *green, &mut *blue];
-                    let [arrives] = level.run(IndirectOf {
-                        shape,
-                        joint: [joint(place)],
-                        scratch,
-                        compare,
-                        indirect: [out.map(|channel| &mut channel[slots(place)])],
-                    });
-                    state[place - first].arrives = arrives;
-                    continue;
-                };
-                let (here, there) = (slots(place), slots(other));
-                let (r0, r1) = red.split_at_mut(there.start);
-                let (g0, g1) = green.split_at_mut(there.start);
-                let (b0, b1) = blue.split_at_mut(there.start);
-                let count = there.len();
-                let arrives = level.run(IndirectOf {
-                    shape,
-                    joint: [joint(place), joint(other)],
+                let slots = layout.slots[place].clone();
+                let slots = slots.start - first_slot..slots.end - first_slot;
+                state[place - first].arrives = level.run(IndirectOf {
+                    shape: &scene.shapes[layout.shapes[place] as usize],
+                    joint: &joint[place * size..(place + 1) * size],
                     scratch,
                     compare,
-                    indirect: [
-                        [&mut r0[here.clone()], &mut g0[here.clone()], &mut b0[here]],
-                        [&mut r1[..count], &mut g1[..count], &mut b1[..count]],
-                    ],
+                    indirect: planes.each_mut().map(|channel| &mut channel[slots.clone()]),
                 });
-                state[place - first].arrives = arrives[0];
-                state[other - first].arrives = arrives[1];
             }
         });
     }

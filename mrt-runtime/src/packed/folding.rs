@@ -4,7 +4,7 @@ use crate::mirrors::{mirrors, texel_permutation};
 use crate::shape::Shape;
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::Matrix;
-use mrt_core::simd::WIDEST;
+use mrt_core::simd::{Aligned, WIDEST};
 
 /// An operator's numbers at mirrored texels may differ by this much of the largest of its mode and count as equal: far
 /// less than what `f32` sums lose.
@@ -29,9 +29,9 @@ pub struct Folding {
     /// By slot; `u32::MAX` where there is no texel.
     pub texel_of_slot: Vec<u32>,
     /// By orbit: texels over elements of the group. Sums over slots count texels of mirrors' planes twice.
-    pub multiplicity: Vec<f32>,
+    pub multiplicity: Aligned<f32>,
     /// By orbit: multiplicity times the area of its texels, over that of a cube's texel.
-    pub weight: Vec<f32>,
+    pub weight: Aligned<f32>,
 }
 
 /// The class of each mode of a shape's operators.
@@ -121,8 +121,8 @@ impl Folding {
             stride,
             slot_of_texel: vec![u32::MAX; texels],
             texel_of_slot: vec![u32::MAX; elements * stride],
-            multiplicity: vec![0.0; stride],
-            weight: vec![0.0; stride],
+            multiplicity: Aligned::zeroed(stride),
+            weight: Aligned::zeroed(stride),
         };
         for (orbit, &first) in firsts.iter().enumerate() {
             let mut distinct = 0;

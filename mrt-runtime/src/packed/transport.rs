@@ -34,6 +34,8 @@ pub struct PackedTransport {
 #[derive(Clone, Debug)]
 pub struct TransportTile {
     pub(crate) entries: Range<u32>,
+    /// How many of them pass gates; those come first.
+    pub(crate) gated: u32,
     /// What sums are multiplied by.
     pub(crate) scale: f32,
 }
@@ -87,7 +89,7 @@ impl<'a> TransportPacker<'a> {
         Self {
             shapes,
             shape_of_block: layout.shapes.iter().map(|&shape| shape as usize).collect(),
-            block_stride: 3 * layout.coefficient_stride as u32,
+            block_stride: 3 * layout.rows as u32,
             storage,
             negligible,
             pending: Vec::new(),
@@ -132,14 +134,13 @@ impl<'a> TransportPacker<'a> {
         // (energy, tile, column) of everything.
         let mut parts: Vec<(f64, u32, u16)> = Vec::new();
         for (tile, rows) in to.row_tiles.iter().enumerate() {
-            let start = usize::from(rows.start);
-            let rows = &to.row_order[start..start + usize::from(rows.count)];
+            let modes = to.modes_of(rows.rows());
             for column in 0..columns {
-                let size = |&row: &u16| {
-                    let row = usize::from(row);
-                    f64::from(to.joint_norms[row]) * f64::from(operator[(row, column)])
+                let size = |mode: usize| {
+                    f64::from(to.joint_norms[mode]) * f64::from(operator[(mode, column)])
                 };
-                let energy: f64 = rows.iter().map(|row| size(row) * size(row)).sum();
+                let sizes = modes.clone().flatten().map(size);
+                let energy: f64 = sizes.map(|size| size * size).sum();
                 let light = f64::from(from.coefficient_norms[column]);
                 parts.push((energy * light * light, tile as u32, column as u16));
             }
@@ -164,17 +165,14 @@ impl<'a> TransportPacker<'a> {
             let tile = part[0].0;
             let first_column = self.columns.len();
             let start = self.values.len();
-            let rows = to.row_tiles[tile as usize];
-            let first_row = usize::from(rows.start);
+            let modes = to.modes_of(to.row_tiles[tile as usize].rows());
             for &(_, column) in part {
-                self.columns.push(column);
-                for k in 0..usize::from(rows.height) {
-                    let value = (k < usize::from(rows.count)).then(|| {
-                        let row = usize::from(to.row_order[first_row + k]);
-                        operator[(row, usize::from(column))] * to.row_units[row]
-                    });
-                    self.values.push(value.unwrap_or(0.0));
-                }
+                let column = usize::from(column);
+                self.columns.push(from.row_of_mode[column]);
+                let values = modes
+                    .clone()
+                    .map(|mode| mode.map_or(0.0, |mode| operator[(mode, column)] * to.units[mode]));
+                self.values.extend(values);
             }
             self.pending.push(Pending {
                 target: target as u32,
@@ -203,6 +201,7 @@ impl<'a> TransportPacker<'a> {
             let first_tile = packed.tiles.len() as u32;
             for (tile, rows) in shape.row_tiles.iter().enumerate() {
                 let height = usize::from(rows.height);
+                values.fill_line();
                 let first = next;
                 while next < self.pending.len()
                     && (self.pending[next].target, self.pending[next].tile)
@@ -248,8 +247,10 @@ impl<'a> TransportPacker<'a> {
                         start: start as u32,
                     });
                 }
+                let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
                 packed.tiles.push(TransportTile {
                     entries: first_entry..packed.entries.len() as u32,
+                    gated: gated as u32,
                     scale,
                 });
             }

@@ -110,6 +110,9 @@ const PAPER_STAGES: [usize; paper::STAGES.len()] = [0, 1, 2];
 /// Steps of [`Bench::goals`].
 const STEPS: usize = 8;
 
+/// A tolerance, of the brightest indirect irradiance: far below what an eye sees and operators err by.
+const TOLERANCE: f32 = 1e-3;
+
 /// Bytes of operators that maze41 may take, in units of 1e6.
 const MEGABYTES: f64 = 3.0;
 
@@ -135,23 +138,46 @@ impl Bench<'_> {
         self.against_paper(presets, &lit, kept, &mut goals)?;
 
         next("maze41, mobile")?;
-        let mobile = fastest("mobile", presets.mobile);
-        let [small, large] = self.pair((&usual, mobile), (&usual, standard))?;
-        let most = Limit::AtMost(0.12);
-        for (of, what) in [indirect, whole].into_iter().zip(["indirect", "frame"]) {
-            let figure = format!("maze41, {what}: mobile / standard");
-            goals.push(Goal::ratio(&figure, most, of(&small), of(&large)));
+        let small = fastest("mobile", presets.mobile);
+        for simd in SimdLevel::available() {
+            let [small, large] = [small, standard].map(|variant| Variant { simd, ..variant });
+            let [small, large] = self.pair((&usual, small), (&usual, large))?;
+            let most = Limit::AtMost(0.12);
+            for (of, what) in [indirect, whole].into_iter().zip(["indirect", "frame"]) {
+                let figure = format!("maze41, {what}, {}: mobile / standard", simd.name());
+                goals.push(Goal::ratio(&figure, most, of(&small), of(&large)));
+            }
         }
 
         next("maze41, one light moves")?;
         let mut moving = new(&usual, &standard)?.with_motion(Motion::OneLight);
+        let tolerant = new(&usual, &standard)?.with_motion(Motion::OneLight);
+        let mut tolerant = tolerant.with_tolerance(TOLERANCE).map_err(|source| {
+            let case = format!("{}/{}", usual.name, standard.name());
+            MeasureError::Ours { case, source }
+        })?;
         let mut anew = new(&usual, &standard)?;
-        let [part, all] = self.times([&mut moving, &mut anew])?;
-        goals.push(Goal::ratio(
-            "maze41, frame: one of four lights moves / everything anew",
-            Limit::AtMost(0.4),
-            whole(&part),
-            whole(&all),
+        let mut subjects: [&mut dyn Timed; 3] = [&mut moving, &mut tolerant, &mut anew];
+        let times = in_turns(&mut subjects, self.budget, self.progress)?;
+        moving.go();
+        tolerant.go();
+        let errs = tolerant.largest_difference(&moving);
+        for (times_of, how) in [
+            (&times[0], "to the bit".to_owned()),
+            (&times[1], format!("within {TOLERANCE} of the brightest")),
+        ] {
+            goals.push(Goal::ratio(
+                &format!("maze41, frame: one of four lights moves, {how} / everything anew"),
+                Limit::AtMost(0.4),
+                whole(times_of),
+                whole(&times[2]),
+            ));
+        }
+        goals.push(Goal::new(
+            "maze41, one of four lights moves: largest error of a texel, of what the tolerance states",
+            Limit::AtMost(1.0),
+            [errs / tolerant.stated_error(); 2],
+            String::new(),
         ));
 
         next("instructions")?;

@@ -1,7 +1,7 @@
 //! The frame, as it is measured: everything in the benchmark that knows how `mrt-runtime` is called.
 
 use super::reference::Receiver;
-use super::setting::Setting;
+use super::setting::{ALBEDO, Setting};
 use super::timing::Timed;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
@@ -171,6 +171,7 @@ const STEP: f32 = 0.05;
 pub struct Ours {
     /// The scene.
     pub scene: Scene,
+    config: FrameConfig,
     frame: Frame,
     lights: Vec<Light>,
     motion: Motion,
@@ -207,10 +208,11 @@ impl Ours {
             executor,
             ..FrameConfig::default()
         };
-        let mut frame = Frame::with_config(&scene, config);
+        let mut frame = Frame::with_config(&scene, config.clone());
         frame.solve(&scene, &setting.lights, &Openings, Bounces::Count(1))?;
         Ok(Self {
             scene,
+            config,
             frame,
             lights: setting.lights.clone(),
             motion: Motion::Everything,
@@ -222,6 +224,44 @@ impl Ours {
     /// The same with another motion.
     pub fn with_motion(self, motion: Motion) -> Self {
         Self { motion, ..self }
+    }
+
+    /// The same with a [`FrameConfig::tolerance`] of so much of the brightest indirect irradiance.
+    ///
+    /// # Errors
+    /// [`OursError::Frame`].
+    pub fn with_tolerance(mut self, share: f32) -> Result<Self, OursError> {
+        let brightest = self.frame.indirect().into_iter().fold(0.0, f32::max);
+        let config = FrameConfig {
+            tolerance: share * brightest,
+            ..self.config.clone()
+        };
+        self.frame = Frame::with_config(&self.scene, config.clone());
+        self.config = config;
+        let bounces = Bounces::Count(1);
+        self.frame
+            .solve(&self.scene, &self.lights, &Openings, bounces)?;
+        Ok(self)
+    }
+
+    /// What [`FrameConfig::tolerance`] says that a texel errs by after one bounce, with the albedo of the benchmark's
+    /// levels.
+    pub fn stated_error(&self) -> f64 {
+        f64::from(self.config.tolerance * (1.0 + ALBEDO.max_element()))
+    }
+
+    /// Lets moving lights be where they go to, and not where they began.
+    pub fn go(&mut self) {
+        if !self.is_moved {
+            self.run();
+        }
+    }
+
+    /// The largest difference of a texel's indirect irradiance from another frame's of the same level.
+    pub fn largest_difference(&self, other: &Self) -> f64 {
+        let (a, b) = (self.frame.indirect(), other.frame.indirect());
+        let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
+        f64::from(apart.fold(0.0, f32::max))
     }
 
     /// Moves the first lights there or back.
@@ -273,8 +313,7 @@ impl Ours {
     /// Bytes of b and r of all blocks.
     fn signal_bytes(&self) -> [usize; 2] {
         let layout = &self.scene.layout;
-        [layout.coefficient_stride, layout.joint_stride]
-            .map(|stride| RGB_BYTES * stride * layout.block_count())
+        [RGB_BYTES * layout.rows * layout.block_count(); 2]
     }
 
     /// What each of [`STAGES`] has to do where every block is lit: the products as they are made, folded by mirrors and
