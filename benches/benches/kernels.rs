@@ -96,15 +96,15 @@ enum Tiles {
 /// Operands of the three kernels of tiles.
 struct TileProduct<E> {
     tiles: Tiles,
-    panels: [Vec<E>; 2],
+    panels: [Aligned<E>; 2],
     lists: ColumnLists,
-    x: Vec<f32>,
+    x: Aligned<f32>,
     columns: usize,
 }
 
 struct RunTiles<'a, E>(&'a TileProduct<E>, &'a mut [TileSums; 2]);
 
-impl<E: Element> Kernel for RunTiles<'_, E> {
+impl<E: Number> Kernel for RunTiles<'_, E> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {

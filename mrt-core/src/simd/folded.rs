@@ -291,8 +291,8 @@ fn unfold_with<
             for vector in 0..VECTORS {
                 let at = at + vector * L::N;
                 let mut v = [zero; GROUP];
-                for class in 0..GROUP {
-                    v[class] = sums[class][channel][vector];
+                for (v, class) in v.iter_mut().zip(&sums) {
+                    *v = class[channel][vector];
                 }
                 butterflies::<L, GROUP>(l, &mut v);
                 // SAFETY: at + N <= stride.
