@@ -119,6 +119,59 @@ fn a_small_run_gives_json_csv_and_plots() {
 }
 
 #[test]
+fn figures_say_what_is_asked_measured_and_met() {
+    let folder = folder();
+    let arguments = ["--figures", "--quick", "--json", "--out", "out"];
+    let output = bench(&folder, &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("high / paper is left out"));
+    let goals: Vec<Value> = text(&output.stdout)
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("each line is an object"))
+        .collect();
+    let named = |part: &str| {
+        let figure = |goal: &&Value| goal["figure"].as_str().is_some_and(|f| f.contains(part));
+        let found: Vec<&Value> = goals.iter().filter(figure).collect();
+        assert!(!found.is_empty(), "{part}");
+        found
+    };
+    for goal in &goals {
+        let measured = goal["measured"].as_f64().expect("a number");
+        assert!(measured.is_finite() && measured >= 0.0, "{goal}");
+        let asked = goal["asked"].as_str().expect("words");
+        let (side, limit) = asked.rsplit_once(' ').expect("a side and a limit");
+        let limit: f64 = limit.parse().expect("a number");
+        let met = match side {
+            "at most" => measured <= limit,
+            "at least" => measured >= limit,
+            _ => panic!("{asked}"),
+        };
+        assert_eq!(goal["met"].as_bool(), Some(met), "{goal}");
+    }
+    // What no machine's speed changes.
+    for part in [
+        "MB of operators",
+        "error of a texel",
+        "error: standard / paper",
+    ] {
+        for goal in named(part) {
+            assert_eq!(goal["met"].as_bool(), Some(true), "{goal}");
+        }
+    }
+    for part in [
+        "standard / paper dense",
+        "mobile / standard",
+        "within 0.001",
+        "100 mazes of ten",
+        "maze1000 / maze10",
+    ] {
+        named(part);
+    }
+    let table = fs::read_to_string(folder.path().join("out/figures.csv")).expect("it is written");
+    assert_eq!(table.lines().count(), 1 + goals.len());
+}
+
+#[test]
 fn wrong_flags_are_refused_with_what_was_expected() {
     let folder = folder();
     for (arguments, code, expected) in [

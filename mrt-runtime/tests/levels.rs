@@ -1,5 +1,5 @@
-//! A frame with each instruction set of this machine against the scalar reference. Needs little, so that it can run under
-//! emulation too.
+//! A frame with each instruction set of this machine against the scalar reference, and against the bits that it always had.
+//! Needs little, so that it can run under emulation too.
 
 use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
@@ -7,18 +7,24 @@ use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, assemble};
 use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, FrameConfig};
+use mrt_runtime::frame::{Bounces, Frame, FrameConfig, Outputs};
+use mrt_runtime::level::Door;
 use mrt_runtime::light::Light;
 use mrt_runtime::maze::maze;
+use mrt_runtime::probes::ProbeOrder;
 use mrt_runtime::visibility::Openings;
 
 /// Share of the brightest texel by which levels may differ: sums of some hundred products in another order, in `f32`.
 const ROUNDING: f32 = 1e-5;
 
+fn dictionary() -> Dictionary {
+    let bytes = include_bytes!("../../assets/versions/2.mrt");
+    Dictionary::from_bytes(bytes, &mut ByteBudget::new(64 << 20)).expect("sound")
+}
+
 #[test]
 fn every_level_gives_the_light_of_the_scalar_reference() {
-    let bytes = include_bytes!("../../assets/versions/2.mrt");
-    let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(64 << 20)).expect("sound");
+    let dictionary = dictionary();
     let level = maze(9, vec3(0.7, 0.5, 0.3), 3);
     let lamp = |block: usize, intensity: Vec3| Light::Sphere {
         // Off every texel's line through an edge of an opening: no texel is lit or not by rounding.
@@ -69,4 +75,77 @@ fn every_level_gives_the_light_of_the_scalar_reference() {
             }
         }
     }
+}
+
+/// Bits of all that frames of each level compute with `f32`, `f16` and `int8`; the same in every build, on every machine.
+/// To be replaced when kernels add up in another order on purpose.
+const HASHES: [(SimdLevel, u64); 5] = [
+    (SimdLevel::Scalar, 0x4241_9808_f278_5a29),
+    (SimdLevel::Sse2, 0x6563_1939_2423_1d9b),
+    (SimdLevel::Avx2, 0x176e_a5d4_0b53_0004),
+    (SimdLevel::Avx512, 0x022a_0648_cb45_4af0),
+    (SimdLevel::Neon, 0x06db_1e10_796f_5efe),
+];
+
+/// Fowler, Noll and Vo's hash 1a.
+fn hash(hash: u64, values: &[f32]) -> u64 {
+    let bytes = values.iter().flat_map(|x| x.to_bits().to_le_bytes());
+    bytes.fold(hash, |h, byte| {
+        (h ^ u64::from(byte)).wrapping_mul(0x100_0000_01b3)
+    })
+}
+
+fn hash_of(dictionary: &Dictionary, simd: SimdLevel) -> u64 {
+    let mut level = maze(13, vec3(0.9, 0.5, 0.2), 5);
+    level.doors.push(Door {
+        connection: 3,
+        value: 0.4,
+    });
+    let mut sum = 0xcbf2_9ce4_8422_2325;
+    for storage in Storage::ALL {
+        let config = AssembleConfig {
+            shape_storage: storage,
+            transport_storage: storage,
+            ..AssembleConfig::default()
+        };
+        let scene = assemble(&level, dictionary, &config).expect("it fits");
+        let config = FrameConfig {
+            simd,
+            outputs: Outputs {
+                probes: Some(ProbeOrder::L2),
+                ..Outputs::default()
+            },
+            ..FrameConfig::default()
+        };
+        let mut frame = Frame::with_config(&scene, config);
+        // The caller's direct light, so that libraries' roots have no part in it.
+        let light = |k: usize| ((k * 7919 + 13) % 2048) as f32 / 2048.0;
+        let direct: Vec<f32> = (0..3 * scene.texel_count()).map(light).collect();
+        for bounces in [Bounces::Count(1), Bounces::Feedback, Bounces::Count(4)] {
+            let solved = frame.solve_from_direct(&scene, &direct, bounces);
+            assert_eq!(solved, Ok(()));
+            sum = hash(sum, &frame.coefficients());
+            sum = hash(sum, &frame.indirect());
+            sum = hash(sum, frame.lightmap().as_flattened());
+            sum = hash(sum, frame.probes().expect("baked").values().as_flattened());
+        }
+    }
+    sum
+}
+
+#[test]
+fn the_bits_of_each_level_stay_as_they_are() {
+    let dictionary = dictionary();
+    let mut wrong = Vec::new();
+    for simd in SimdLevel::available() {
+        let found = hash_of(&dictionary, simd);
+        let expected = HASHES
+            .iter()
+            .find(|known| known.0 == simd)
+            .map(|known| known.1);
+        if expected != Some(found) {
+            wrong.push(format!("{}: {found:#018x}", simd.name()));
+        }
+    }
+    assert!(wrong.is_empty(), "other bits than recorded: {wrong:?}");
 }

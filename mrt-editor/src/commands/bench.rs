@@ -22,7 +22,7 @@ use crate::dictionary_source::{
     DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
 };
 use crate::picture::file::WriteError;
-use goals::{Goal, Presets};
+use goals::{Goal, Mazes, Presets};
 use machine::Machine;
 use measure::{Baseline, Bench, MeasureError};
 use mrt_core::container::write_file_atomically;
@@ -93,7 +93,7 @@ pub struct BenchArgs {
     #[arg(long)]
     pub product: bool,
     /// Measures only what the frame is held to, and says what is met; what needs the high preset asks for its file with
-    /// --dictionary, or for --presets high.
+    /// --dictionary, or for --presets high. With --quick, of smaller mazes.
     #[arg(long)]
     pub figures: bool,
     /// Fewer mazes and dictionaries, and less time for each: about two minutes.
@@ -189,7 +189,12 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
             progress,
         };
         if args.figures {
-            let goals = bench.goals(presets(&dictionaries), &kept)?;
+            let mazes = if args.quick {
+                Mazes::QUICK
+            } else {
+                Mazes::FULL
+            };
+            let goals = bench.goals(presets(&dictionaries), mazes, &kept)?;
             return Ok((Vec::new(), goals));
         }
         let records = measure_all(args, &dictionaries, &kept, &mut bench, progress)?;

@@ -104,6 +104,28 @@ pub struct Presets<'a> {
     pub high: Option<&'a Dictionary>,
 }
 
+/// Blocks of the mazes that are measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mazes {
+    /// Of the usual one.
+    pub usual: usize,
+    /// Of the largest, and of what is made of islands of ten together.
+    pub large: usize,
+}
+
+impl Mazes {
+    /// What the frame is held to.
+    pub const FULL: Mazes = Mazes {
+        usual: 41,
+        large: 10_000,
+    };
+    /// A look at all figures, in less time.
+    pub const QUICK: Mazes = Mazes {
+        usual: 11,
+        large: 1000,
+    };
+}
+
 /// All products of the paper's way.
 const PAPER_STAGES: [usize; paper::STAGES.len()] = [0, 1, 2];
 
@@ -113,8 +135,11 @@ const STEPS: usize = 8;
 /// A tolerance, of the brightest indirect irradiance: far below what an eye sees and operators err by.
 const TOLERANCE: f32 = 1e-3;
 
-/// Bytes of operators that maze41 may take, in units of 1e6.
+/// Bytes of operators that the usual maze may take, in units of 1e6.
 const MEGABYTES: f64 = 3.0;
+
+/// Lights of the usual maze.
+const FOUR_LIGHTS: usize = 4;
 
 /// Lights that are close together, in a small and in a large level.
 const LIGHTS_TOGETHER: usize = 10;
@@ -124,32 +149,39 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// [`MeasureError`].
-    pub fn goals(&mut self, presets: Presets, kept: &Path) -> Result<Vec<Goal>, MeasureError> {
+    pub fn goals(
+        &mut self,
+        presets: Presets,
+        mazes: Mazes,
+        kept: &Path,
+    ) -> Result<Vec<Goal>, MeasureError> {
+        let Mazes { usual, large } = mazes;
+        let maze = format!("maze{usual}");
         let mut goals = Vec::new();
         let mut step = 0;
         let mut next = |what: &str| {
             step += 1;
             self.progress.step(what, step, STEPS)
         };
-        next("maze41, a light in every block")?;
-        let lit = Setting::new(41, Some(41));
-        let usual = Setting::new(41, None);
+        next(&format!("{maze}, a light in every block"))?;
+        let lit = Setting::new(usual, Some(usual));
+        let usual = Setting::new(usual, Some(FOUR_LIGHTS));
         let standard = fastest("standard", presets.standard);
         self.against_paper(presets, &lit, kept, &mut goals)?;
 
-        next("maze41, mobile")?;
+        next(&format!("{maze}, mobile"))?;
         let small = fastest("mobile", presets.mobile);
         for simd in SimdLevel::available() {
             let [small, large] = [small, standard].map(|variant| Variant { simd, ..variant });
             let [small, large] = self.pair((&usual, small), (&usual, large))?;
             let most = Limit::AtMost(0.12);
             for (of, what) in [indirect, whole].into_iter().zip(["indirect", "frame"]) {
-                let figure = format!("maze41, {what}, {}: mobile / standard", simd.name());
+                let figure = format!("{maze}, {what}, {}: mobile / standard", simd.name());
                 goals.push(Goal::ratio(&figure, most, of(&small), of(&large)));
             }
         }
 
-        next("maze41, one light moves")?;
+        next(&format!("{maze}, one light moves"))?;
         let mut moving = new(&usual, &standard)?.with_motion(Motion::OneLight);
         let tolerant = new(&usual, &standard)?.with_motion(Motion::OneLight);
         let mut tolerant = tolerant.with_tolerance(TOLERANCE).map_err(|source| {
@@ -167,14 +199,16 @@ impl Bench<'_> {
             (&times[1], format!("within {TOLERANCE} of the brightest")),
         ] {
             goals.push(Goal::ratio(
-                &format!("maze41, frame: one of four lights moves, {how} / everything anew"),
+                &format!("{maze}, frame: one of four lights moves, {how} / everything anew"),
                 Limit::AtMost(0.4),
                 whole(times_of),
                 whole(&times[2]),
             ));
         }
         goals.push(Goal::new(
-            "maze41, one of four lights moves: largest error of a texel, of what the tolerance states",
+            &format!(
+                "{maze}, one of four lights moves: largest error of a texel, of what the tolerance states"
+            ),
             Limit::AtMost(1.0),
             [errs / tolerant.stated_error(); 2],
             String::new(),
@@ -202,7 +236,7 @@ impl Bench<'_> {
                 };
                 let [a, b] = self.pair((&lit, with(slow)), (&lit, with(fast)))?;
                 let figure = format!(
-                    "maze41 all lit, indirect, {}: {} / {}",
+                    "{maze} all lit, indirect, {}: {} / {}",
                     storage.name(),
                     slow.name(),
                     fast.name()
@@ -223,16 +257,17 @@ impl Bench<'_> {
             )?;
             let bytes = ours.scene.operator_bytes() as f64 / 1e6;
             goals.push(Goal::new(
-                &format!("maze41, {}: MB of operators", storage.name()),
+                &format!("{maze}, {}: MB of operators", storage.name()),
                 Limit::AtMost(MEGABYTES),
                 [bytes; 2],
                 String::new(),
             ));
         }
 
-        next("maze1000, two threads")?;
+        let thousand = format!("maze{}", large / 10);
+        next(&format!("{thousand}, two threads"))?;
         if std::thread::available_parallelism().is_ok_and(|cores| cores.get() > 1) {
-            let level = Setting::new(1000, None);
+            let level = Setting::new(large / 10, None);
             let two = Variant {
                 threads: 2,
                 ..standard
@@ -244,7 +279,7 @@ impl Bench<'_> {
             let [one, two, alone, shared] = [0, 1, 2, 3].map(|k| &times[k]);
             let at_most = significant(alone.median(&[0]) / shared.median(&[0]));
             for (of, what) in [indirect, whole].into_iter().zip(["indirect", "frame"]) {
-                let figure = format!("maze1000, {what}: one thread / two threads");
+                let figure = format!("{thousand}, {what}: one thread / two threads");
                 let goal = Goal::ratio(&figure, Limit::AtLeast(1.7), of(one), of(two));
                 let detail = format!("{}; sums in registers {at_most}", goal.detail);
                 goals.push(Goal { detail, ..goal });
@@ -253,14 +288,15 @@ impl Bench<'_> {
             eprintln!("mrt: two threads are left out: this machine has one core");
         }
 
-        next("1000 mazes of ten, ten blocks lit")?;
-        let many = Setting::islands(1000, LIGHTS_TOGETHER);
+        let islands = large / LIGHTS_TOGETHER;
+        next(&format!("{islands} mazes of ten, ten blocks lit"))?;
+        let many = Setting::islands(islands, LIGHTS_TOGETHER);
         let one = Setting::islands(1, LIGHTS_TOGETHER);
         let mut many = new(&many, &standard)?.with_motion(Motion::AllLights);
         let mut one = new(&one, &standard)?.with_motion(Motion::AllLights);
         let [of_many, of_one] = self.times([&mut many, &mut one])?;
         let goal = Goal::ratio(
-            "ten lights move, frame: 1000 mazes of ten, one lit / one of them alone",
+            &format!("ten lights move, frame: {islands} mazes of ten, one lit / one of them alone"),
             Limit::AtMost(2.0),
             whole(&of_many),
             whole(&of_one),
@@ -269,14 +305,15 @@ impl Bench<'_> {
         let detail = format!("{}; {} and {} blocks lit", goal.detail, lit[0], lit[1]);
         goals.push(Goal { detail, ..goal });
 
-        next("maze10000, ten blocks lit")?;
-        let large = Setting::together(10_000, LIGHTS_TOGETHER);
+        next(&format!("maze{large}, ten blocks lit"))?;
+        let name = format!("ten lights close together move, frame: maze{large} / maze10");
+        let large = Setting::together(large, LIGHTS_TOGETHER);
         let small = Setting::together(LIGHTS_TOGETHER, LIGHTS_TOGETHER);
         let mut large = new(&large, &standard)?.with_motion(Motion::AllLights);
         let mut small = new(&small, &standard)?.with_motion(Motion::AllLights);
         let [of_large, of_small] = self.times([&mut large, &mut small])?;
         let goal = Goal::ratio(
-            "ten lights close together move, frame: maze10000 / maze10",
+            &name,
             Limit::AtMost(2.0),
             whole(&of_large),
             whole(&of_small),
@@ -316,7 +353,7 @@ impl Bench<'_> {
             stages: &PAPER_STAGES,
         };
         goals.push(Goal::ratio(
-            "maze41 all lit, indirect: standard / paper dense",
+            &format!("{} all lit, indirect: standard / paper dense", lit.name),
             Limit::AtMost(0.35),
             indirect(&times[0]),
             of_paper,
@@ -329,14 +366,17 @@ impl Bench<'_> {
         .map(|light| exact.rel_l2(&light));
         let [x, y] = errors.map(|error| significant(100.0 * error));
         goals.push(Goal::new(
-            "maze41 all lit, error: standard / paper dense",
+            &format!("{} all lit, error: standard / paper dense", lit.name),
             Limit::AtMost(1.0),
             [errors[0] / errors[1]; 2],
             format!("{x} % / {y} %"),
         ));
         if let Some(times) = times.get(2) {
             goals.push(Goal::ratio(
-                "maze41 all lit, indirect: high / paper dense of standard",
+                &format!(
+                    "{} all lit, indirect: high / paper dense of standard",
+                    lit.name
+                ),
                 Limit::AtMost(1.0),
                 indirect(times),
                 of_paper,
