@@ -211,7 +211,6 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
     if args.figures {
         return report_goals(args, &goals);
     }
-    write_files(&args.out, &records, &machine)?;
     if args.json {
         for record in &records {
             crate::report_line!("{}", serde_json::to_string(record)?);
@@ -369,8 +368,10 @@ fn measure_all(
             records.extend(bench.dense(&setting, reference, baseline)?);
             records.extend(bench.rays(&setting, reference, baseline)?);
         }
+        // Large mazes take long, and who does not wait for them keeps what there is.
+        mark_pareto(&mut records);
+        write_files(&args.out, &records, bench.machine)?;
     }
-    mark_pareto(&mut records);
     Ok(records)
 }
 

@@ -299,18 +299,23 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
                 *to += factor * from;
             }
         }
-        let runs = LitRuns {
-            entries: &entries[gated..],
-            has_coefficients: block.has_coefficients,
-            all_lit: block.all_lit,
-        };
-        let lit = runs.map(|(columns, start)| Term {
+        let entries = &entries[gated..];
+        let term = |(columns, start): (Range<usize>, usize)| Term {
             panels: [&values[start..start + columns.len() * rows]],
             columns: transport.columns.get(columns.clone()),
             x,
             scales: transport.column_scales.get(columns).unwrap_or(&[]),
-        });
-        sum_terms(l, lit, rows, &mut sums);
+        };
+        if block.all_lit {
+            // One term, whose sums need not be kept for others.
+            sum_terms(l, run_of(entries).map(term).into_iter(), rows, &mut sums);
+        } else {
+            let runs = LitRuns {
+                entries,
+                has_coefficients: block.has_coefficients,
+            };
+            sum_terms(l, runs.map(term), rows, &mut sums);
+        }
         if gated > 0 {
             for (to, from) in sums
                 .as_flattened_mut()
@@ -338,7 +343,6 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
 struct LitRuns<'a> {
     entries: &'a [TransportEntry],
     has_coefficients: &'a [bool],
-    all_lit: bool,
 }
 
 impl Iterator for LitRuns<'_> {
@@ -347,9 +351,6 @@ impl Iterator for LitRuns<'_> {
 
     #[inline(always)]
     fn next(&mut self) -> Option<Self::Item> {
-        if self.all_lit {
-            return run_of(std::mem::take(&mut self.entries));
-        }
         let is_lit = |entry: &TransportEntry| self.has_coefficients[entry.source as usize];
         let dark = self.entries.iter().take_while(|entry| !is_lit(entry));
         let rest = &self.entries[dark.count()..];
