@@ -80,8 +80,8 @@ impl StageTimes {
     }
 }
 
-/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's [`Executor`](crate::executor::Executor) does aside, and
-/// the first frame of another scene with probes).
+/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's
+/// [`Executor`](crate::executor::Executor) does aside, and the first frame of another scene with probes).
 ///
 /// [`Frame::direct`], [`Frame::indirect`] and [`Frame::coefficients`] give signals block by block in the level's order, in
 /// a block channel by channel (red, green, blue), and in a channel texel by texel in the canonical shape's order. They

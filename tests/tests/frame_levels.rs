@@ -1,4 +1,4 @@
-//! Instructions and storage: each level against the scalar reference, its bits for ever, and kept numbers against `f32`.
+//! Instructions and storage: each level against the scalar reference, and kept numbers against `f32`.
 
 mod common;
 #[path = "common/sequences.rs"]
@@ -17,7 +17,7 @@ use mrt_runtime::probes::ProbeOrder;
 use mrt_runtime::scene::Scene;
 use mrt_runtime::visibility::Openings;
 use sequences::{
-    STORAGES, mobile_dictionary, random_level, random_lights, stored, vector_dictionary,
+    STORAGES, mobile_dictionary, outputs, random_level, random_lights, stored, vector_dictionary,
 };
 
 const OUTPUTS: Outputs = Outputs {
@@ -41,18 +41,7 @@ const ROUNDING: f64 = 3e-6;
 
 /// Largest difference of each output from the scalar reference's, over its largest number.
 fn apart(frame: &Frame, scalar: &Frame) -> Vec<(&'static str, f64)> {
-    let values = |frame: &Frame| {
-        let probes = frame.probes().map(|p| p.values().as_flattened().to_vec());
-        [
-            ("direct", frame.direct()),
-            ("coefficients", frame.coefficients()),
-            ("indirect", frame.indirect()),
-            ("lightmap", frame.lightmap().as_flattened().to_vec()),
-            ("probes", probes.unwrap_or_default()),
-            ("vector", frame.vector().to_vec()),
-        ]
-    };
-    let pairs = values(frame).into_iter().zip(values(scalar));
+    let pairs = outputs(frame).into_iter().zip(outputs(scalar));
     pairs
         .map(|((name, a), (_, b))| {
             let triples = |x: &[f32]| x.iter().map(|&x| [x; 3]).collect::<Vec<_>>();

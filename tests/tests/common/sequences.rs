@@ -182,8 +182,8 @@ pub fn random_lights(
     lights.into_iter().filter(fits).collect()
 }
 
-/// Everything that a frame shows, by name, bit by bit.
-pub fn shown(frame: &Frame) -> Vec<(&'static str, Vec<u32>)> {
+/// Everything that a frame shows, by name.
+pub fn outputs(frame: &Frame) -> [(&'static str, Vec<f32>); 6] {
     let probes = frame.probes().map(|p| p.values().as_flattened().to_vec());
     [
         ("direct", frame.direct()),
@@ -193,9 +193,14 @@ pub fn shown(frame: &Frame) -> Vec<(&'static str, Vec<u32>)> {
         ("probes", probes.unwrap_or_default()),
         ("vector", frame.vector().to_vec()),
     ]
-    .into_iter()
-    .map(|(name, values)| (name, values.into_iter().map(f32::to_bits).collect()))
-    .collect()
+}
+
+/// The same, bit by bit.
+pub fn shown(frame: &Frame) -> Vec<(&'static str, Vec<u32>)> {
+    let outputs = outputs(frame).into_iter();
+    outputs
+        .map(|(name, values)| (name, values.into_iter().map(f32::to_bits).collect()))
+        .collect()
 }
 
 /// Where two frames show something else, if anywhere: what, the index, and both values.

@@ -100,7 +100,7 @@ pub struct Presets<'a> {
     pub standard: &'a Dictionary,
     /// The smallest.
     pub mobile: &'a Dictionary,
-    /// With 96 modes; baking it takes minutes.
+    /// With 64 modes; baking it takes a while.
     pub high: Option<&'a Dictionary>,
 }
 
