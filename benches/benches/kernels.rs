@@ -128,8 +128,8 @@ impl<E: Number> Kernel for RunTiles<'_, E> {
         let [first, second] = sums;
         let [first, second] = [out(first), out(second)];
         match product.tiles {
-            Tiles::One => sum_tile(l, std::iter::once(one), first),
-            Tiles::Half => sum_half_tile(l, std::iter::once(one), first),
+            Tiles::One => sum_tile(l, std::iter::once(one), None, first),
+            Tiles::Half => sum_half_tile(l, std::iter::once(one), None, first),
             Tiles::Two => sum_two_tiles(l, two, [first, second]),
         }
     }
@@ -214,7 +214,7 @@ impl<E: Element> Kernel for RunDots<'_, E> {
     type Output = [[f32; DOT_ROWS]; CHANNELS];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
-        dot_rows(l, self.rows, self.x)
+        dot_rows(l, DOT_ROWS, self.rows, self.x)
     }
 }
 
@@ -518,7 +518,7 @@ impl Kernel for DotProduct<'_> {
             let x = [column(0), column(1), column(2)];
             let mut row = 0;
             while row < m {
-                let sums = dot_rows(l, &self.rows[row * k..(row + DOT_ROWS) * k], x);
+                let sums = dot_rows(l, DOT_ROWS, &self.rows[row * k..(row + DOT_ROWS) * k], x);
                 for (channel, sums) in sums.iter().enumerate() {
                     let at = (first + channel) * m + row;
                     self.out[at..at + DOT_ROWS].copy_from_slice(sums);

@@ -142,14 +142,14 @@ const MAX_PATH_DEPTH: f64 = 8.0;
 pub const PRESETS: [&str; 4] = ["mobile", "standard", "high", "quality"];
 
 impl BakeConfig {
-    /// A named preset: `mobile` (6² texels, 12 modes), `standard` (16², 32), `high` (16², 64) or `quality` (16², 96).
+    /// A named preset: `mobile` (5² texels, 12 modes), `standard` (16², 32), `high` (16², 64) or `quality` (16², 96).
     ///
     /// # Errors
     /// [`ConfigError::UnknownPreset`].
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
         let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name
         {
-            "mobile" => (6, 12, 64, [32, 24, 8], 4),
+            "mobile" => (5, 12, 64, [32, 24, 8], 4),
             "standard" => (16, 32, 128, [96, 64, 32], 5),
             "high" => (16, 64, 192, [160, 160, 48], 5),
             "quality" => (16, 96, 192, [160, 160, 96], 5),

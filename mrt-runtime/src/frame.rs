@@ -10,6 +10,7 @@ mod direct_stage;
 mod kernels;
 mod limit;
 mod pass;
+mod tasks;
 
 use crate::executor::MAX_TASKS;
 use crate::light::{Light, LightError, MAX_LIGHT_VALUE, place};

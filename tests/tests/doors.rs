@@ -26,7 +26,7 @@ fn assembled(level: &Level, coupling: Coupling) -> Scene {
     let config = AssembleConfig {
         coupling,
         transport_storage: Storage::F32,
-        negligible: 0.0,
+        negligible: Some(0.0),
         ..AssembleConfig::default()
     };
     assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")

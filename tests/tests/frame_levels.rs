@@ -115,7 +115,7 @@ fn stored_operators_err_as_stated() {
         let config = AssembleConfig {
             shape_storage,
             transport_storage,
-            negligible,
+            negligible: Some(negligible),
             ..AssembleConfig::default()
         };
         let scene = assemble(&level, default_dictionary(), &config).expect("the level fits");

@@ -335,7 +335,7 @@ fn text_that_is_no_level_says_why() {
 }
 
 #[test]
-fn far_levels_and_endless_depths_are_refused() {
+fn far_levels_and_absurd_settings_are_refused() {
     let mut level = Level::from_cells(&[[0, 0, 0], [1, 0, 0]], Vec3::ONE).expect("two cells");
     let config = |max_depth, max_bytes| AssembleConfig {
         max_depth,
@@ -355,6 +355,16 @@ fn far_levels_and_endless_depths_are_refused() {
         refused(&level, config(8, 1 << 10)),
         AssembleError::TooLarge { .. }
     ));
+    for share in [-0.1, 1.0, f32::NAN, f32::INFINITY] {
+        let config = AssembleConfig {
+            negligible: Some(share),
+            ..AssembleConfig::default()
+        };
+        assert!(matches!(
+            refused(&level, config),
+            AssembleError::Negligible { .. }
+        ));
+    }
     for block in &mut level.blocks {
         for corner in &mut block.warp.corners {
             corner.z += 1e6;

@@ -68,7 +68,7 @@ fn two_lights() -> [Light; 2] {
 fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f32; 3]>) {
     // What is left out of far light may differ where two parts of it are the same size.
     let config = AssembleConfig {
-        negligible: 0.0,
+        negligible: Some(0.0),
         ..AssembleConfig::default()
     };
     let scene = assemble(level, default_dictionary(), &config).expect("it fits");

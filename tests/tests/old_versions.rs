@@ -92,7 +92,7 @@ fn version_1_lights_a_level_as_its_program_did() {
     // Figures of a program that kept operators in `f32`.
     let config = AssembleConfig {
         transport_storage: Storage::F32,
-        negligible: 0.0,
+        negligible: Some(0.0),
         ..AssembleConfig::default()
     };
     let scene = assemble(&level(), &read(1), &config).expect("it fits");

@@ -22,7 +22,7 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
         let config = AssembleConfig {
             coupling,
             transport_storage: Storage::F32,
-            negligible: 0.0,
+            negligible: Some(0.0),
             ..AssembleConfig::default()
         };
         let scene = assemble(&level, &dictionary, &config).expect("a maze is a level");

@@ -252,7 +252,7 @@ const RECIPROCITY: f64 = 0.02;
 fn exact_config() -> AssembleConfig {
     AssembleConfig {
         transport_storage: mrt_core::storage::Storage::F32,
-        negligible: 0.0,
+        negligible: Some(0.0),
         ..AssembleConfig::default()
     }
 }

@@ -98,7 +98,7 @@ fn lit_to<M: OperatorMatrix>(
         coupling,
         max_depth,
         transport_storage: Storage::F32,
-        negligible: 0.0,
+        negligible: Some(0.0),
         ..AssembleConfig::default()
     };
     let scene = assemble(level, dictionary, &config).expect("the level fits the dictionary");

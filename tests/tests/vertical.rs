@@ -34,7 +34,7 @@ fn assembled(level: &Level, coupling: Coupling) -> Scene {
         // The table's, so that it stands for itself.
         max_depth: 4,
         // What is left out of far light may differ where two parts of it are the same size.
-        negligible: 0.0,
+        negligible: Some(0.0),
         transport_storage: mrt_core::storage::Storage::F32,
         ..AssembleConfig::default()
     };

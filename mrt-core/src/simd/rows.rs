@@ -14,19 +14,21 @@ use super::tiles::{CHANNELS, Element};
 /// Rows of a group in [`dot_rows`], at most.
 pub const DOT_ROWS: usize = 4;
 
-/// Sums of up to [`DOT_ROWS`] rows of numbers times three vectors: `out[channel][row]`, zero for rows that there are not.
+/// Sums of `count` rows of numbers times three vectors: `out[channel][row]`, zero for rows that there are not.
 ///
 /// `rows` holds row after row, each as long as a vector; lengths are multiples of [`WIDEST`](super::WIDEST).
 ///
 /// # Panics
-/// If `rows` is not 1 to [`DOT_ROWS`] times as long as a vector, or that length is no multiple of the lanes.
+/// If `count` is not 1 to [`DOT_ROWS`], `rows` not that many times as long as a vector, or that length no multiple of the
+/// lanes.
 #[inline(always)]
 pub fn dot_rows<L: Lanes, E: Element>(
     l: L,
+    count: usize,
     rows: &[E],
     x: [&[f32]; CHANNELS],
 ) -> [[f32; DOT_ROWS]; CHANNELS] {
-    match rows.len() / x[0].len().max(1) {
+    match count {
         1 => dot_some_rows::<L, E, 1, 4>(l, rows, x),
         2 => dot_some_rows::<L, E, 2, 2>(l, rows, x),
         3 => dot_some_rows::<L, E, 3, 1>(l, rows, x),

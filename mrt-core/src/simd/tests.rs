@@ -146,7 +146,7 @@ impl<E: tiles::Element> Kernel for Tile<'_, E> {
             scales: &[],
         });
         if self.is_half {
-            tiles::sum_half_tile(l, once, out(&mut sums));
+            tiles::sum_half_tile(l, once, None, out(&mut sums));
         } else {
             let mut twice = [[[f32::NAN; tiles::TILE]; 3]; 2];
             let [first, second] = &mut twice;
@@ -161,7 +161,7 @@ impl<E: tiles::Element> Kernel for Tile<'_, E> {
                 },
                 [out(first), out(second)],
             );
-            tiles::sum_tile(l, once, out(&mut sums));
+            tiles::sum_tile(l, once, None, out(&mut sums));
             // The same panel three times; sums of columns may be taken in another order.
             for (pair, single) in twice[0].iter().zip(&sums) {
                 for (a, b) in pair.iter().zip(single) {
@@ -183,7 +183,7 @@ impl Kernel for Dot<'_> {
     type Output = [[f32; rows::DOT_ROWS]; 3];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
-        rows::dot_rows(l, self.rows, self.x)
+        rows::dot_rows(l, self.rows.len() / self.x[0].len(), self.rows, self.x)
     }
 }
 

@@ -151,23 +151,43 @@ pub struct Term<'a, E, const PANELS: usize = 1> {
     pub scales: &'a [f32],
 }
 
+/// What is made of the sums of a tile or half tile before they are written: `sums * scale * factors + own`.
+#[derive(Clone, Copy, Debug)]
+pub struct Finish<'a> {
+    /// For all rows.
+    pub scale: f32,
+    /// By row.
+    pub factors: &'a [f32],
+    /// By channel, in that by row.
+    pub own: [&'a [f32]; CHANNELS],
+}
+
+impl Finish<'_> {
+    /// Of one vector of rows.
+    #[inline(always)]
+    fn apply<L: Lanes>(&self, l: L, channel: usize, row: usize, sum: L::V) -> L::V {
+        let factor = l.mul(l.splat(self.scale), l.load(&self.factors[row..]));
+        l.mul_add(sum, factor, l.load(&self.own[channel][row..]))
+    }
+}
+
 /// `sums = panel * x[columns]` over all terms, for a tile of [`TILE`] rows.
 ///
 /// # Panics
-/// If a panel does not have a tile of numbers for each column, or `x` is shorter than any of the lists of columns allows.
+/// If a panel does not have a tile of numbers for each column, `x` is shorter than any of the lists of columns allows,
+/// or anything in `finish` has fewer rows than the tile.
 #[inline(always)]
 pub fn sum_tile<'a, L: Lanes, E: Element>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
+    finish: Option<Finish<'_>>,
     sums: TileOut<'_>,
 ) {
     match L::N {
-        4 => sum_rows::<L, E, 1, 4, 1, TILE>(l, terms, [sums]),
-        // What is converted on loading takes a register more, and with twelve sums one would live in memory.
-        8 if E::CONVERTED => sum_rows::<L, E, 1, 2, 1, TILE>(l, terms, [sums]),
-        8 => sum_rows::<L, E, 1, 2, 2, TILE>(l, terms, [sums]),
-        16 => sum_rows::<L, E, 1, 1, 4, TILE>(l, terms, [sums]),
-        _ => sum_rows_one_by_one::<L, E, TILE>(l, terms, sums),
+        4 => sum_rows::<L, E, 1, 4, 1, TILE>(l, terms, finish, [sums]),
+        8 => sum_rows::<L, E, 1, 2, 2, TILE>(l, terms, finish, [sums]),
+        16 => sum_rows::<L, E, 1, 1, 2, TILE>(l, terms, finish, [sums]),
+        _ => sum_rows_one_by_one::<L, E, TILE>(l, terms, finish, sums),
     }
 }
 
@@ -179,8 +199,8 @@ pub fn sum_tile<'a, L: Lanes, E: Element>(
 pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [TileOut<'_>; 2]) {
     let once = std::iter::once(term);
     match L::N {
-        8 => sum_rows::<L, E, 2, 2, 1, TILE>(l, once, sums),
-        16 => sum_rows::<L, E, 2, 1, 2, TILE>(l, once, sums),
+        8 => sum_rows::<L, E, 2, 2, 1, TILE>(l, once, None, sums),
+        16 => sum_rows::<L, E, 2, 1, 2, TILE>(l, once, None, sums),
         // Four lanes would need more registers than there are.
         _ => {
             let [first, second] = sums;
@@ -199,8 +219,8 @@ pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [Ti
                     scales,
                 })
             };
-            sum_tile(l, half(0), first);
-            sum_tile(l, half(1), second);
+            sum_tile(l, half(0), None, first);
+            sum_tile(l, half(1), None, second);
         }
     }
 }
@@ -213,15 +233,14 @@ pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [Ti
 pub fn sum_half_tile<'a, L: Lanes, E: Element>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
+    finish: Option<Finish<'_>>,
     sums: TileOut<'_>,
 ) {
     let l = l.narrow();
     match <L::Narrow as Lanes>::N {
-        4 => sum_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, [sums]),
-        // As above.
-        8 if E::CONVERTED => sum_rows::<_, E, 1, 1, 3, HALF_TILE>(l, terms, [sums]),
-        8 => sum_rows::<_, E, 1, 1, 4, HALF_TILE>(l, terms, [sums]),
-        _ => sum_rows_one_by_one::<_, E, HALF_TILE>(l, terms, sums),
+        4 => sum_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, finish, [sums]),
+        8 => sum_rows::<_, E, 1, 1, 2, HALF_TILE>(l, terms, finish, [sums]),
+        _ => sum_rows_one_by_one::<_, E, HALF_TILE>(l, terms, finish, sums),
     }
 }
 
@@ -239,6 +258,7 @@ fn sum_rows<
 >(
     l: L,
     terms: impl Iterator<Item = Term<'a, E, PANELS>>,
+    finish: Option<Finish<'_>>,
     sums: [TileOut<'_>; PANELS],
 ) {
     assert_eq!(VECTORS * L::N, ROWS);
@@ -317,7 +337,11 @@ fn sum_rows<
                 for other in &acc[1..] {
                     sum = l.add(sum, other[panel][channel][v]);
                 }
-                l.store(&mut out[v * L::N..(v + 1) * L::N], sum);
+                let at = v * L::N;
+                if let Some(finish) = &finish {
+                    sum = finish.apply(l, channel, at, sum);
+                }
+                l.store(&mut out[at..at + L::N], sum);
             }
         }
     }
@@ -351,25 +375,22 @@ unsafe fn add_column<
         (at(0), at(1), at(2))
     };
     let x = if E::SCALED {
-        [
-            l.splat(red * scale),
-            l.splat(green * scale),
-            l.splat(blue * scale),
-        ]
+        [red * scale, green * scale, blue * scale]
     } else {
-        [l.splat(red), l.splat(green), l.splat(blue)]
+        [red, green, blue]
     };
     for (panel, acc) in panels.iter().zip(acc) {
-        #[allow(
-            clippy::needless_range_loop,
-            reason = "iterators may not be inlined with their lanes"
-        )]
-        for v in 0..VECTORS {
+        let mut a = [l.splat(0.0); VECTORS];
+        for (v, a) in a.iter_mut().enumerate() {
             let at = k * ROWS + v * L::N;
             // SAFETY: the caller's promises.
-            let a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
-            for channel in 0..CHANNELS {
-                acc[channel][v] = l.mul_add(a, x[channel], acc[channel][v]);
+            *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
+        }
+        // One channel after another: eight lanes have registers for one of `x` besides two sets of sums.
+        for channel in 0..CHANNELS {
+            let x = l.splat(x[channel]);
+            for v in 0..VECTORS {
+                acc[channel][v] = l.mul_add(a[v], x, acc[channel][v]);
             }
         }
     }
@@ -380,6 +401,7 @@ unsafe fn add_column<
 fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
+    finish: Option<Finish<'_>>,
     sums: TileOut<'_>,
 ) {
     assert_eq!(L::N, 1);
@@ -409,48 +431,11 @@ fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
             }
         }
     }
-}
-
-/// `to = sums * scale * factors + own`: the numbers of a tile or half tile, one channel.
-///
-/// # Panics
-/// If `factors`, `own` and `to` are not of one length, that is [`TILE`] or [`HALF_TILE`].
-#[inline(always)]
-pub fn finish_tile<L: Lanes>(
-    l: L,
-    sums: &[f32; TILE],
-    scale: f32,
-    factors: &[f32],
-    own: &[f32],
-    to: &mut [f32],
-) {
-    if to.len() == TILE {
-        finish_rows::<L, TILE>(l, sums, scale, factors, own, to);
-    } else {
-        finish_rows::<L::Narrow, HALF_TILE>(l.narrow(), sums, scale, factors, own, to);
-    }
-}
-
-#[inline(always)]
-fn finish_rows<L: Lanes, const ROWS: usize>(
-    l: L,
-    sums: &[f32; TILE],
-    scale: f32,
-    factors: &[f32],
-    own: &[f32],
-    to: &mut [f32],
-) {
-    assert!(factors.len() == ROWS && own.len() == ROWS && to.len() == ROWS);
-    let scale = l.splat(scale);
-    let mut at = 0;
-    while at < ROWS {
-        // SAFETY: at + N <= ROWS, the length of everything.
-        unsafe {
-            let factor = l.mul(scale, l.load_unchecked(factors, at));
-            let own = l.load_unchecked(own, at);
-            let sum = l.load_unchecked(sums, at);
-            l.store_unchecked(to, at, l.mul_add(sum, factor, own));
+    if let Some(finish) = &finish {
+        for (channel, sums) in sums.iter_mut().enumerate() {
+            for (row, sum) in sums.iter_mut().enumerate() {
+                *sum = l.sum(finish.apply(l, channel, row, l.splat(*sum)));
+            }
         }
-        at += L::N;
     }
 }

@@ -34,16 +34,18 @@ pub(super) fn limit_flux(
     let layout = &scene.layout;
     // Sums in one order, whichever blocks came to have light first.
     blocks.alive.sort_unstable();
-    for channel in 0..3 {
-        let (mut sent, mut arrived) = (0.0, 0.0);
-        for &block in &blocks.alive {
-            let state = &blocks.state[block as usize];
-            sent += state.sent[channel] + SPOT_GAIN * state.fresh[channel];
-            arrived += state.arrived[channel];
-            // What arrived may be of joint coefficients that were more.
-            let shape = &scene.shapes[layout.shapes[block as usize] as usize];
-            sent += f64::from(state.lag * shape.area);
+    let (mut sent, mut arrived) = ([0.0; 3], [0.0; 3]);
+    for &block in &blocks.alive {
+        let state = &blocks.state[block as usize];
+        // What arrived may be of joint coefficients that were more.
+        let shape = &scene.shapes[layout.shapes[block as usize] as usize];
+        let lag = f64::from(state.lag * shape.area);
+        for channel in 0..3 {
+            sent[channel] += state.sent[channel] + SPOT_GAIN * state.fresh[channel] + lag;
+            arrived[channel] += state.arrived[channel];
         }
+    }
+    for (channel, (mut sent, arrived)) in sent.into_iter().zip(arrived).enumerate() {
         let most = &mut blocks.most_sent[channel];
         if nothing_waits {
             *most = sent;

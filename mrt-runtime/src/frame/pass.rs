@@ -1,8 +1,8 @@
 //! Bounces: which blocks take part, and the two stages of a pass over them.
 
-use super::blocks::{BlockState, Blocks};
-use super::kernels::{ChangeOf, CoefficientsOf, IndirectOf, ResponsesOf, Scratch, Sent};
+use super::blocks::Blocks;
 use super::limit::limit_flux;
+use super::tasks::{Lit, Receivers, Senders};
 use super::{Bounces, Frame, MAX_PASSES};
 use crate::executor::{run_parts, task_count};
 use crate::scene::{Planes, Scene};
@@ -125,6 +125,9 @@ impl Frame {
             blocks.lit -= usize::from(had);
             if all || had || state.had_coefficients {
                 blocks.await_light(block);
+                if blocks.waiting.len() == blocks.state.len() {
+                    continue;
+                }
                 for &reached in scene.transport.reached(block as usize) {
                     blocks.await_light(reached);
                 }
@@ -221,44 +224,19 @@ impl Frame {
         let parts = (0..tasks).map_while(|k| {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
             let span = span(list);
-            Some(Part {
+            Some(Senders {
+                scene,
                 list,
                 first: span.start,
+                direct,
+                indirect: reflects_indirect.then_some(indirect),
                 coefficients: coefficients.take(span.clone()),
                 flags: flags.take(span.clone()),
                 state: state.take(span),
                 scratch: scratch.next()?,
             })
         });
-        run_parts(executor, parts, |part: Part<'_>| {
-            for &block in part.list {
-                let place = block as usize;
-                let at = place - part.first;
-                let coefficients = &mut part.coefficients[at * size..(at + 1) * size];
-                let state = &mut part.state[at];
-                let reflects_indirect = reflects_indirect && state.has_indirect;
-                if !state.has_fresh && !reflects_indirect {
-                    coefficients.fill(0.0);
-                    part.flags[at] = false;
-                    (state.sent, state.fresh) = ([0.0; 3], [0.0; 3]);
-                    continue;
-                }
-                let slots = layout.slots[place].clone();
-                let emits = scene.surface.emitting.binary_search(&block).is_ok();
-                let Sent { all, fresh } = level.run(CoefficientsOf {
-                    shape: &scene.shapes[layout.shapes[place] as usize],
-                    direct: direct.block(slots.clone()),
-                    indirect: reflects_indirect.then(|| indirect.block(slots.clone())),
-                    albedo: scene.surface.albedo.block(slots.clone()),
-                    uniform: scene.surface.uniform[place],
-                    emission: emits.then(|| scene.surface.emission.block(slots.clone())),
-                    scratch: part.scratch,
-                    coefficients,
-                });
-                (state.sent, state.fresh) = (all, fresh);
-                part.flags[at] = coefficients.iter().any(|&b| b != 0.0);
-            }
-        });
+        run_parts(executor, parts, |part| level.run(part));
     }
 
     /// Joint coefficients of the targets. Those that change light by no more than `keep_within` stay what they were.
@@ -287,52 +265,21 @@ impl Frame {
         let parts = (0..tasks).map_while(|k| {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
             let span = span(list);
-            Some((
+            Some(Receivers {
+                scene,
                 list,
-                joint.take(span.clone()),
-                state.take(span),
-                scratch.next()?,
-            ))
+                first: span.start,
+                coefficients,
+                has_coefficients,
+                all_lit,
+                gate_values,
+                keep_within,
+                joint: joint.take(span.clone()),
+                state: state.take(span),
+                scratch: scratch.next()?,
+            })
         });
-        run_parts(executor, parts, |(list, joint, state, scratch)| {
-            let first = span(list).start;
-            for &block in list {
-                let place = block as usize;
-                let at = place - first;
-                let shape = &scene.shapes[layout.shapes[place] as usize];
-                let kept = &mut joint[at * size..(at + 1) * size];
-                let state = &mut state[at];
-                let responses = |joint| ResponsesOf {
-                    block: place,
-                    shape,
-                    transport: &scene.transport,
-                    coefficients,
-                    has_coefficients,
-                    all_lit,
-                    gate_values,
-                    joint,
-                };
-                (state.is_kept, state.lag) = (false, 0.0);
-                let Some(most) = keep_within else {
-                    level.run(responses(kept));
-                    continue;
-                };
-                let now = &mut scratch.joint[..];
-                level.run(responses(&mut *now));
-                let change = level.run(ChangeOf {
-                    shape,
-                    before: kept,
-                    now,
-                });
-                // What goes dark goes dark.
-                let goes_dark = change > 0.0 && now.iter().all(|&r| r == 0.0);
-                if change <= most && !goes_dark {
-                    (state.is_kept, state.lag) = (true, change);
-                } else {
-                    kept.copy_from_slice(now);
-                }
-            }
-        });
+        run_parts(executor, parts, |part| level.run(part));
     }
 
     /// Indirect light of the targets.
@@ -341,7 +288,6 @@ impl Frame {
         let level = self.config.simd;
         let layout = &*self.layout;
         let joint = &self.joint;
-        let size = 3 * layout.rows;
         // After one bounce nobody asks what changed.
         let compare = self.blocks.kept != Kept::Once;
         let Blocks { targets, state, .. } = &mut self.blocks;
@@ -356,25 +302,19 @@ impl Frame {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
             let span = span(list);
             let slots = layout.slots[span.start].start..layout.slots[span.end - 1].end;
-            let (state, planes) = (state.take(span), planes.take(slots));
-            Some((list, state, planes, scratch.next()?))
+            Some(Lit {
+                scene,
+                list,
+                first: span.start,
+                first_slot: slots.start,
+                joint,
+                compare,
+                state: state.take(span),
+                planes: planes.take(slots),
+                scratch: scratch.next()?,
+            })
         });
-        run_parts(executor, parts, |(list, state, mut planes, scratch)| {
-            let first = span(list).start;
-            let first_slot = layout.slots[first].start;
-            for &block in list {
-                let place = block as usize;
-                let slots = layout.slots[place].clone();
-                let slots = slots.start - first_slot..slots.end - first_slot;
-                state[place - first].arrives = level.run(IndirectOf {
-                    shape: &scene.shapes[layout.shapes[place] as usize],
-                    joint: &joint[place * size..(place + 1) * size],
-                    scratch,
-                    compare,
-                    indirect: planes.each_mut().map(|channel| &mut channel[slots.clone()]),
-                });
-            }
-        });
+        run_parts(executor, parts, |part| level.run(part));
     }
 }
 
@@ -436,14 +376,4 @@ pub(super) fn span(list: &[u32]) -> std::ops::Range<usize> {
         (Some(&first), Some(&last)) => first as usize..last as usize + 1,
         _ => 0..0,
     }
-}
-
-/// Work on coefficients for one task: everything between its first block and its last.
-struct Part<'a> {
-    list: &'a [u32],
-    first: usize,
-    coefficients: &'a mut [f32],
-    flags: &'a mut [bool],
-    state: &'a mut [BlockState],
-    scratch: &'a mut Scratch,
 }

@@ -5,6 +5,7 @@ use crate::shape::Shape;
 use mrt_core::cube_symmetry::CubeSymmetry;
 use mrt_core::matrix::Matrix;
 use mrt_core::simd::{Aligned, WIDEST};
+use std::cmp::Reverse;
 
 /// An operator's numbers at mirrored texels may differ by this much of the largest of its mode and count as equal: far
 /// less than what `f32` sums lose.
@@ -15,7 +16,8 @@ const SYMMETRY_TOLERANCE: f32 = 1e-6;
 ///
 /// Element bit k says that mirror k was applied. Modes are even or odd under each mirror, class bit k saying odd under
 /// mirror k, so sums over an orbit split into one a class, and a mode needs numbers for one texel of each orbit.
-/// A texel on a mirror's plane takes two slots, which always hold the same.
+/// A texel on a mirror's plane takes two slots, which always hold the same. Where orbits are so few that they mostly are
+/// padding, some of the mirrors are left out.
 #[derive(Clone, Debug)]
 pub struct Folding {
     /// Number of mirrors, 0 to 3.
@@ -32,6 +34,21 @@ pub struct Folding {
     pub multiplicity: Aligned<f32>,
     /// By orbit: multiplicity times the area of its texels, over that of a cube's texel.
     pub weight: Aligned<f32>,
+}
+
+/// Multiply-adds that take as long as all else that is done with a slot: sums and differences both ways, loads and
+/// stores. Measured on x86-64, where 6 and 10 choose alike but for straight blocks at 6²: these are slower at 6.
+const SLOT_COST: usize = 10;
+
+/// A mirror that a shape and its operators have.
+struct Mirror {
+    /// Whether it exchanges floor and ceiling.
+    is_up: bool,
+    /// By texel: its image.
+    permutation: Vec<u32>,
+    /// Whether modes are odd.
+    coefficients: Vec<bool>,
+    joint: Vec<bool>,
 }
 
 /// The class of each mode of a shape's operators.
@@ -55,8 +72,7 @@ impl Folding {
             coefficients: vec![0; coefficients.rows()],
             joint: vec![0; joint.columns()],
         };
-        let mut permutations: Vec<Vec<u32>> = Vec::new();
-        let mut up_mirror = None;
+        let mut found: Vec<Mirror> = Vec::new();
         let candidates = if shape.tube().is_some() {
             Vec::new()
         } else {
@@ -69,35 +85,56 @@ impl Folding {
                 let other = area(permutation[k] as usize);
                 (area(k) - other).abs() <= SYMMETRY_TOLERANCE * other
             });
-            let of_coefficients: Option<Vec<bool>> = (0..coefficients.rows())
+            let coefficients: Option<Vec<bool>> = (0..coefficients.rows())
                 .map(|mode| parity(&permutation, |texel| coefficients[(mode, texel)]))
                 .collect();
-            let of_joint: Option<Vec<bool>> = (0..joint.columns())
+            let joint: Option<Vec<bool>> = (0..joint.columns())
                 .map(|mode| parity(&permutation, |texel| joint[(texel, mode)]))
                 .collect();
-            if let (true, Some(of_coefficients), Some(of_joint)) =
-                (same_areas, of_coefficients, of_joint)
-            {
-                let bit = 1 << permutations.len();
-                let odd = |is_odd: bool| if is_odd { bit } else { 0 };
-                let modes = classes.coefficients.iter_mut().zip(of_coefficients);
-                modes.for_each(|(class, is_odd)| *class |= odd(is_odd));
-                let modes = classes.joint.iter_mut().zip(of_joint);
-                modes.for_each(|(class, is_odd)| *class |= odd(is_odd));
-                if map == CubeSymmetry::mirror(1) {
-                    up_mirror = Some(permutations.len());
-                }
-                permutations.push(permutation);
+            if let (true, Some(coefficients), Some(joint)) = (same_areas, coefficients, joint) {
+                found.push(Mirror {
+                    is_up: map == CubeSymmetry::mirror(1),
+                    permutation,
+                    coefficients,
+                    joint,
+                });
             }
+        }
+        let folded = |subset: usize| {
+            let bits = (0..found.len()).filter(move |k| subset >> k & 1 == 1);
+            let permutations = bits.clone().map(|k| &found[k].permutation[..]).collect();
+            (Self::by_mirrors(texels, permutations, areas), bits)
+        };
+        let modes = coefficients.rows() + joint.columns();
+        // Tiles need the mirror between floor and ceiling.
+        let (folding, bits) = (0..1usize << found.len())
+            .filter(|subset| (0..found.len()).all(|k| !found[k].is_up || subset >> k & 1 == 1))
+            .map(folded)
+            .min_by_key(|(folding, _)| (folding.cost(modes), Reverse(folding.mirrors)))
+            .expect("the subset of all mirrors");
+        let up_mirror = bits.clone().position(|k| found[k].is_up);
+        for (bit, k) in bits.enumerate() {
+            let add = |classes: &mut [u8], is_odd: &[bool]| {
+                for (class, &is_odd) in classes.iter_mut().zip(is_odd) {
+                    *class |= u8::from(is_odd) << bit;
+                }
+            };
+            add(&mut classes.coefficients, &found[k].coefficients);
+            add(&mut classes.joint, &found[k].joint);
         }
         let folding = Self {
             up_mirror,
-            ..Self::by_mirrors(texels, &permutations, areas)
+            ..folding
         };
         (folding, classes)
     }
 
-    fn by_mirrors(texels: usize, permutations: &[Vec<u32>], areas: &[f32]) -> Self {
+    /// What a block costs: multiply-adds of so many modes, and work on slots, in units of a number a channel.
+    fn cost(&self, modes: usize) -> usize {
+        self.stride * modes + self.slots() * SLOT_COST
+    }
+
+    fn by_mirrors(texels: usize, permutations: Vec<&[u32]>, areas: &[f32]) -> Self {
         let elements = 1usize << permutations.len();
         let image = |element: usize, texel: usize| {
             (0..permutations.len())

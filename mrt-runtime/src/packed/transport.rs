@@ -61,7 +61,7 @@ pub struct TransportPacker<'a> {
     /// From a block's coefficients to the next one's.
     block_stride: u32,
     storage: Storage,
-    negligible: f32,
+    negligible: Option<f32>,
     pending: Vec<Pending>,
     columns: Vec<u16>,
     values: Vec<f32>,
@@ -84,7 +84,7 @@ impl<'a> TransportPacker<'a> {
         shapes: &'a [PackedShape],
         layout: &Layout,
         storage: Storage,
-        negligible: f32,
+        negligible: Option<f32>,
     ) -> Self {
         Self {
             shapes,
@@ -150,7 +150,8 @@ impl<'a> TransportPacker<'a> {
             return;
         }
         parts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
-        let share = f64::from(self.negligible).max(ROUNDING);
+        let share = self.negligible.unwrap_or_else(|| negligible(columns));
+        let share = f64::from(share).max(ROUNDING);
         let mut left_out = 0.0;
         let kept = parts
             .iter()
@@ -248,6 +249,27 @@ impl<'a> TransportPacker<'a> {
                     });
                 }
                 let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
+                if let Some(last) = entries[gated..].last() {
+                    // Kernels take columns in pairs: a column of zeros makes the run of what passes no gate even.
+                    let columns: usize = entries[gated..].iter().map(|p| p.columns.len()).sum();
+                    if columns % 2 == 1 {
+                        let column = last.source * self.block_stride;
+                        let end = packed.columns.push([column]).end;
+                        packed
+                            .entries
+                            .last_mut()
+                            .expect("the last of these")
+                            .columns
+                            .end = end as u32;
+                        for _ in 0..height {
+                            values.push(0.0, 1.0);
+                        }
+                        if self.storage == Storage::Int8 {
+                            packed.column_scales.push(1.0);
+                        }
+                        packed.multiply_adds += 3 * height;
+                    }
+                }
                 packed.tiles.push(TransportTile {
                     entries: first_entry..packed.entries.len() as u32,
                     gated: gated as u32,
@@ -275,6 +297,11 @@ impl<'a> TransportPacker<'a> {
         packed.gates = self.gates;
         packed
     }
+}
+
+/// What may be left out of the light of so many modes, if nothing else is asked for.
+fn negligible(modes: usize) -> f32 {
+    (0.02 * (32.0 / modes as f32).powi(2)).clamp(0.02, 0.15)
 }
 
 /// Share of a pair's light that is rounding: what mirrors make zero is this small.
