@@ -11,7 +11,7 @@ mod cone;
 
 use crate::light::PlacedLight;
 use crate::scene::{Beyond, Scene, SceneBlock};
-use cone::{Cone, ON_PLANE, Source, narrowed};
+use cone::{Cone, ON_PLANE, Scratch, Source, narrowed};
 use glam::Vec3;
 use mrt_core::cube::Face;
 use mrt_core::tube::TubeForm;
@@ -25,7 +25,7 @@ pub const MAX_PLANES: usize = 16;
 const MAX_PENDING: usize = 1024;
 
 /// A light's direct light in a block, through one sequence of openings.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Beam {
     /// The block that it lights.
     pub block: u32,
@@ -36,6 +36,7 @@ pub struct Beam {
     /// Where the planes have their origin, metres: the light, or a point of the block for directional lights.
     /// Differences from it keep their digits far from the world's origin.
     pub origin: Vec3,
+    /// Those beyond the count are anything.
     planes: [[f32; 4]; MAX_PLANES],
     plane_count: u32,
     /// True if planes do not tell which points are lit: a bend or too many planes are on the way. The light's
@@ -54,13 +55,28 @@ impl Beam {
     }
 }
 
+impl PartialEq for Beam {
+    fn eq(&self, other: &Self) -> bool {
+        (self.block, self.light, self.exact) == (other.block, other.light, other.exact)
+            && (self.fraction, self.origin) == (other.fraction, other.origin)
+            && self.planes() == other.planes()
+    }
+}
+
 /// Follows lights through the openings of one scene. Made once; tracing allocates nothing.
 #[derive(Debug)]
 pub struct BeamTracer {
     /// Openings that lead outside: the block, and which of its portals.
     outside: Vec<(u32, u32)>,
-    /// Beams to be followed further.
+    /// Beams to be followed further: the first [`BeamTracer::waiting`]. More stay for later, never more than there is
+    /// room for.
     pending: Vec<Node>,
+    waiting: usize,
+    /// The one that is followed, what becomes of it beyond an opening, and its light there.
+    node: Node,
+    next: Node,
+    beam: Beam,
+    scratch: Scratch,
     /// For each block, the trace that last gave it an exact beam.
     exact: Vec<u32>,
     /// Number of the trace that runs.
@@ -68,7 +84,7 @@ pub struct BeamTracer {
 }
 
 /// A beam on its way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Node {
     block: u32,
     entered: Option<Face>,
@@ -76,6 +92,23 @@ struct Node {
     depth: u32,
     fraction: f32,
     cone: Cone,
+}
+
+impl Node {
+    const NEW: Node = Node {
+        block: 0,
+        entered: None,
+        depth: 0,
+        fraction: 1.0,
+        cone: Cone::EVERYWHERE,
+    };
+
+    /// Takes over another, without the planes that it does not use.
+    fn copy_from(&mut self, other: &Node) {
+        (self.block, self.entered) = (other.block, other.entered);
+        (self.depth, self.fraction) = (other.depth, other.fraction);
+        self.cone.copy_from(&other.cone);
+    }
 }
 
 /// What one trace works on.
@@ -98,6 +131,19 @@ impl BeamTracer {
             outside: Vec::with_capacity(openings),
             // A cube has five openings besides the one entered, and the light's block six.
             pending: Vec::with_capacity(MAX_PENDING.min(5 * scene.blocks.len() + 1)),
+            waiting: 0,
+            node: Node::NEW,
+            next: Node::NEW,
+            beam: Beam {
+                block: 0,
+                light: 0,
+                fraction: 0.0,
+                origin: Vec3::ZERO,
+                planes: [[0.0; 4]; MAX_PLANES],
+                plane_count: 0,
+                exact: false,
+            },
+            scratch: Scratch::NEW,
             exact: vec![0; scene.blocks.len()],
             trace: 0,
         };
@@ -152,14 +198,9 @@ impl BeamTracer {
         };
         match placed.block {
             Some(block) => {
-                let node = Node {
-                    block: block as u32,
-                    entered: None,
-                    depth: 0,
-                    fraction: 1.0,
-                    cone: Cone::EVERYWHERE,
-                };
-                self.enter(&mut trace, node);
+                self.next.copy_from(&Node::NEW);
+                self.next.block = block as u32;
+                self.enter(&mut trace);
                 self.follow(&mut trace);
             }
             None => {
@@ -173,7 +214,7 @@ impl BeamTracer {
     }
 
     fn start_marks(&mut self) {
-        self.pending.clear();
+        self.waiting = 0;
         self.trace = self.trace.wrapping_add(1);
         if self.trace == 0 {
             self.exact.fill(0);
@@ -195,28 +236,30 @@ impl BeamTracer {
             Some(door) => trace.doors[door as usize],
             None => 1.0,
         };
-        if let Some(cone) = narrowed(&Cone::EVERYWHERE, &trace.source, portal, 0) {
-            let node = Node {
-                block: index,
-                entered: Some(portal.face),
-                depth: 1,
-                fraction,
-                cone,
-            };
-            self.enter(trace, node);
+        let next = &mut self.next;
+        let (cone, scratch) = (&Cone::EVERYWHERE, &mut self.scratch);
+        if narrowed(cone, &trace.source, portal, 0, scratch, &mut next.cone) {
+            (next.block, next.entered) = (index, Some(portal.face));
+            (next.depth, next.fraction) = (1, fraction);
+            self.enter(trace);
         }
     }
 
     /// Follows everything that is pending.
     fn follow(&mut self, trace: &mut Trace<'_>) {
         let scene = trace.scene;
-        while let Some(node) = self.pending.pop() {
-            let block = &scene.blocks[node.block as usize];
+        while self.waiting > 0 {
+            self.waiting -= 1;
+            self.node.copy_from(&self.pending[self.waiting]);
+            let block = &scene.blocks[self.node.block as usize];
             // As far as a line that enters each block at most once can get.
-            if node.depth as usize + 1 >= scene.blocks.len() + usize::from(trace.home.is_none()) {
+            if self.node.depth as usize + 1
+                >= scene.blocks.len() + usize::from(trace.home.is_none())
+            {
                 continue;
             }
             for portal in &block.portals {
+                let node = &self.node;
                 let Beyond::Block {
                     block: next, face, ..
                 } = block.beyond[portal.face.index()]
@@ -236,53 +279,53 @@ impl BeamTracer {
                 let Some(beyond) = beyond.filter(|_| fraction > 0.0) else {
                     continue;
                 };
-                if let Some(cone) = narrowed(&node.cone, &trace.source, beyond, node.depth) {
-                    let next = Node {
-                        block: next as u32,
-                        entered: Some(face),
-                        depth: node.depth + 1,
-                        fraction,
-                        cone,
-                    };
-                    self.enter(trace, next);
+                let (source, depth, scratch) = (&trace.source, node.depth, &mut self.scratch);
+                let to = &mut self.next;
+                if narrowed(&node.cone, source, beyond, depth, scratch, &mut to.cone) {
+                    (to.block, to.entered) = (next as u32, Some(face));
+                    (to.depth, to.fraction) = (depth + 1, fraction);
+                    self.enter(trace);
                 }
             }
         }
     }
 
-    /// Emits the beam of a block that light has entered, and leaves it pending.
-    fn enter(&mut self, trace: &mut Trace<'_>, mut node: Node) {
+    /// Emits the beam of the block that light has entered, and leaves it pending.
+    fn enter(&mut self, trace: &mut Trace<'_>) {
+        let node = &mut self.next;
         if node.fraction <= 0.0 {
             return;
         }
         let block = &trace.scene.blocks[node.block as usize];
-        if trace.source.misses(block) {
+        if trace.source.misses(block) || !beam_in(block, &trace.source, node, &mut self.beam) {
             return;
         }
-        let Some(mut beam) = beam_in(block, &trace.source, &node) else {
-            return;
-        };
         // Light that has crossed a bend, or part of one, is not in a cone.
         if block.shape.tube() == Some(TubeForm::Bend) {
             node.cone.is_exact = false;
-            beam.exact = true;
+            self.beam.exact = true;
         }
-        beam.light = trace.light;
-        self.give(trace, &beam);
-        if self.pending.len() < self.pending.capacity() {
-            self.pending.push(node);
+        self.beam.light = trace.light;
+        self.give(trace);
+        if self.waiting < self.pending.len() {
+            self.pending[self.waiting].copy_from(&self.next);
+            self.waiting += 1;
+        } else if self.pending.len() < self.pending.capacity() {
+            self.pending.push(self.next.clone());
+            self.waiting += 1;
         } else {
             // More than fits is yet to be lit, and receivers find out by themselves what is.
-            self.pending.clear();
+            self.waiting = 0;
             for block in 0..trace.scene.blocks.len() as u32 {
-                beam.block = block;
-                beam.exact = true;
-                self.give(trace, &beam);
+                self.beam.block = block;
+                self.beam.exact = true;
+                self.give(trace);
             }
         }
     }
 
-    fn give(&mut self, trace: &mut Trace<'_>, beam: &Beam) {
+    fn give(&mut self, trace: &mut Trace<'_>) {
+        let beam = &self.beam;
         let mark = &mut self.exact[beam.block as usize];
         if *mark != self.trace {
             if beam.exact {
@@ -293,25 +336,19 @@ impl BeamTracer {
     }
 }
 
-/// The beam of a light in a block, less the planes that the whole block is inside of; `None` if it is outside of one.
+/// Makes `beam` that of a light in a block, less the planes that the whole block is inside of; false if it is outside of
+/// one. Which light's it is, is left alone.
 ///
 /// The image of a trilinear map is in the hull of its corners, and so is a tube in its cube.
-fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
+fn beam_in(block: &SceneBlock, source: &Source, node: &Node, beam: &mut Beam) -> bool {
     let origin = match source.toward {
         None => source.origin,
         Some(_) => block.warp.corners[0],
     }
     .as_vec3();
     let shift = origin.as_dvec3() - source.origin;
-    let mut beam = Beam {
-        block: node.block,
-        light: 0,
-        fraction: node.fraction,
-        origin,
-        planes: [[0.0; 4]; MAX_PLANES],
-        plane_count: 0,
-        exact: !node.cone.is_exact,
-    };
+    (beam.block, beam.fraction, beam.origin) = (node.block, node.fraction, origin);
+    (beam.plane_count, beam.exact) = (0, !node.cone.is_exact);
     let (low, high) = block.bounds;
     let slack = ON_PLANE * (high - low).length();
     for plane in node.cone.planes() {
@@ -322,7 +359,7 @@ fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
             largest = largest.max(distance);
         }
         if largest <= slack {
-            return None;
+            return false;
         }
         if smallest < -slack {
             let n = plane.normal.as_vec3();
@@ -335,7 +372,7 @@ fn beam_in(block: &SceneBlock, source: &Source, node: &Node) -> Option<Beam> {
             beam.plane_count += 1;
         }
     }
-    Some(beam)
+    true
 }
 
 #[cfg(test)]

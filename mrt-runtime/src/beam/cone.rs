@@ -14,9 +14,6 @@ const MAX_CORNERS: usize = 32;
 /// Corners of an opening after clipping by every plane: each cuts off one corner and leaves two.
 const MAX_CLIPPED: usize = MAX_CORNERS + MAX_PLANES;
 
-/// The same for openings of four corners, as nearly all are.
-const FEW_CLIPPED: usize = 4 + MAX_PLANES;
-
 /// A point this near to a plane, in sizes of the opening or block, is on it: a thousand roundings of its coordinates
 /// at [`FAR_LIMIT`](crate::level::FAR_LIMIT). A sliver of shadow or light of that width is below what `f32` texels
 /// resolve.
@@ -47,7 +44,7 @@ impl Plane {
 }
 
 /// The intersection of half-spaces that light is in.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Cone {
     planes: [Plane; MAX_PLANES],
     count: usize,
@@ -64,6 +61,12 @@ impl Cone {
 
     pub(super) fn planes(&self) -> &[Plane] {
         &self.planes[..self.count]
+    }
+
+    /// Takes over another, without the planes that it does not use: most cones have few.
+    pub(super) fn copy_from(&mut self, other: &Cone) {
+        self.planes[..other.count].copy_from_slice(other.planes());
+        (self.count, self.is_exact) = (other.count, other.is_exact);
     }
 
     fn push(&mut self, plane: Plane) {
@@ -106,48 +109,61 @@ impl SpotCone {
     }
 }
 
-/// What of a cone passes an opening into the block whose portal it is; `None` if nothing does. `depth` openings
-/// were passed before.
-pub(super) fn narrowed(cone: &Cone, source: &Source, portal: &Portal, depth: u32) -> Option<Cone> {
-    match portal.corners.len() {
-        4 => narrowed_within::<FEW_CLIPPED>(cone, source, portal, depth),
-        ..=MAX_CORNERS => narrowed_within::<MAX_CLIPPED>(cone, source, portal, depth),
-        _ => Some(Cone {
-            is_exact: false,
-            ..*cone
-        }),
-    }
+/// What [`narrowed`] works on; what was there before does not matter.
+#[derive(Clone, Debug)]
+pub(super) struct Scratch {
+    outline: Clipped,
+    spare: Clipped,
+    sides: [Plane; MAX_CORNERS],
 }
 
-/// [`narrowed`], with polygons of at most `N` corners.
-fn narrowed_within<const N: usize>(
+impl Scratch {
+    pub(super) const NEW: Scratch = Scratch {
+        outline: Clipped::EMPTY,
+        spare: Clipped::EMPTY,
+        sides: [Plane::NONE; MAX_CORNERS],
+    };
+}
+
+/// Puts what of a cone passes an opening into the block whose portal it is in `out`; false if nothing does. `depth`
+/// openings were passed before.
+pub(super) fn narrowed(
     cone: &Cone,
     source: &Source,
     portal: &Portal,
     depth: u32,
-) -> Option<Cone> {
+    scratch: &mut Scratch,
+    out: &mut Cone,
+) -> bool {
     let count = portal.corners.len();
+    if count > MAX_CORNERS {
+        out.copy_from(cone);
+        out.is_exact = false;
+        return true;
+    }
     let corner = |k: usize| portal.corners[if k < count { k } else { k - count }] - source.origin;
     let size = portal.outward.length().sqrt();
     let slack = ON_PLANE * size;
-    let mut outline = Clipped::<N>::EMPTY;
+    let (mut outline, mut spare) = (&mut scratch.outline, &mut scratch.spare);
+    outline.count = 0;
     for k in 0..count {
         outline.push(corner(k), k as u8);
     }
-    let mut spare = Clipped::EMPTY;
     for (k, plane) in cone.planes().iter().enumerate() {
-        if outline.clip(plane, (count + k) as u8, slack, &mut spare)? {
-            std::mem::swap(&mut outline, &mut spare);
+        match outline.clip(plane, (count + k) as u8, slack, spare) {
+            None => return false,
+            Some(true) => std::mem::swap(&mut outline, &mut spare),
+            Some(false) => {}
         }
     }
     if outline.area() <= SMALLEST_SHARE * size * size {
-        return None;
+        return false;
     }
-    let mut sides = [Plane::NONE; N];
     // On which side of each edge the corner after it is: inside all in the outline of a convex opening, as the light
     // sees it.
+    let sides = &mut scratch.sides[..count];
     let (mut is_front, mut is_back) = (false, false);
-    for (k, side) in sides[..count].iter_mut().enumerate() {
+    for (k, side) in sides.iter_mut().enumerate() {
         *side = source.plane_through(corner(k), corner(k + 1));
         let turn = side.at(corner(k + 2));
         is_front |= turn > slack;
@@ -155,7 +171,7 @@ fn narrowed_within<const N: usize>(
     }
     // A light that stands in an opening of its own block, or beyond it by rounding, shines into the next.
     if !is_front && (depth > 0 || source.toward.is_some()) {
-        return None;
+        return false;
     }
     let mut taken = 0u64;
     for &edge in &outline.edges[..outline.count] {
@@ -165,11 +181,8 @@ fn narrowed_within<const N: usize>(
         // A bent opening that is not convex from here: the planes of edges that are clipped away still cut.
         taken = u64::MAX;
     }
-    let mut out = Cone {
-        is_exact: cone.is_exact,
-        ..Cone::EVERYWHERE
-    };
-    let planes = sides[..count].iter().chain(cone.planes());
+    (out.count, out.is_exact) = (0, cone.is_exact);
+    let planes = sides.iter().chain(cone.planes());
     for (k, &plane) in planes.enumerate() {
         if taken & (1 << k) != 0 && plane.normal != DVec3::ZERO {
             out.push(plane);
@@ -184,32 +197,36 @@ fn narrowed_within<const N: usize>(
                 normal: -outward,
                 offset: 0.0,
             }),
-            Some(toward) if toward.dot(outward) <= 0.0 => return None,
+            Some(toward) if toward.dot(outward) <= 0.0 => return false,
             Some(_) => {}
         }
     }
-    Some(out)
+    true
 }
 
 /// A polygon, from the trace's origin, whose edges know the planes that they are on.
-struct Clipped<const N: usize> {
-    corners: [DVec3; N],
+#[derive(Clone, Debug)]
+struct Clipped {
+    corners: [DVec3; MAX_CLIPPED],
     /// Of the edge from each corner to the next: an edge of the opening, or their number and a plane of the cone.
-    edges: [u8; N],
+    edges: [u8; MAX_CLIPPED],
+    /// From the plane that it was last clipped by.
+    distances: [f64; MAX_CLIPPED],
     count: usize,
 }
 
-impl<const N: usize> Clipped<N> {
+impl Clipped {
     const EMPTY: Self = Self {
-        corners: [DVec3::ZERO; N],
-        edges: [0; N],
+        corners: [DVec3::ZERO; MAX_CLIPPED],
+        edges: [0; MAX_CLIPPED],
+        distances: [0.0; MAX_CLIPPED],
         count: 0,
     };
 
     /// Drops what does not fit, as only a polygon that is not convex has so many corners; of such a one the edges
     /// are not asked.
     fn push(&mut self, corner: DVec3, edge: u8) {
-        if self.count < N {
+        if self.count < MAX_CLIPPED {
             (self.corners[self.count], self.edges[self.count]) = (corner, edge);
             self.count += 1;
         }
@@ -217,10 +234,10 @@ impl<const N: usize> Clipped<N> {
 
     /// Puts what is inside a plane, or outside by at most `slack` metres, in `out`; `None` if nothing is. False if
     /// all is, and `out` is then left alone.
-    fn clip(&self, plane: &Plane, edge: u8, slack: f64, out: &mut Self) -> Option<bool> {
-        let mut distances = [0.0; N];
+    fn clip(&mut self, plane: &Plane, edge: u8, slack: f64, out: &mut Self) -> Option<bool> {
         let mut inside = 0;
-        for (distance, &corner) in distances.iter_mut().zip(&self.corners[..self.count]) {
+        let corners = &self.corners[..self.count];
+        for (distance, &corner) in self.distances.iter_mut().zip(corners) {
             *distance = plane.at(corner);
             inside += usize::from(*distance >= -slack);
         }
@@ -233,7 +250,7 @@ impl<const N: usize> Clipped<N> {
         out.count = 0;
         for k in 0..self.count {
             let next = if k + 1 == self.count { 0 } else { k + 1 };
-            let (here, there) = (distances[k], distances[next]);
+            let (here, there) = (self.distances[k], self.distances[next]);
             let crossing = || {
                 let t = (here / (here - there)).clamp(0.0, 1.0);
                 self.corners[k] + (self.corners[next] - self.corners[k]) * t

@@ -116,6 +116,26 @@ impl Blocks {
         }
     }
 
+    /// Makes the first so many waiting blocks the targets.
+    pub(super) fn take_targets(&mut self, count: usize) {
+        self.targets.clear();
+        // Looking at all flags takes less than sorting, unless few are set.
+        if count == self.waiting.len() && count * 8 >= self.state.len() {
+            self.waiting.clear();
+            for (block, state) in (0..).zip(&mut self.state) {
+                if std::mem::take(&mut state.is_waiting) {
+                    self.targets.push(block);
+                }
+            }
+            return;
+        }
+        for block in self.waiting.drain(..count) {
+            self.state[block as usize].is_waiting = false;
+            self.targets.push(block);
+        }
+        self.targets.sort_unstable();
+    }
+
     /// A block's indirect light was written.
     pub(super) fn mark_changed(&mut self, block: u32) {
         let state = &mut self.state[block as usize];

@@ -138,12 +138,7 @@ impl Frame {
             Some(slice) if goes_on => slice.get().min(blocks.waiting.len()),
             _ => blocks.waiting.len(),
         };
-        blocks.targets.clear();
-        for block in blocks.waiting.drain(..count) {
-            blocks.state[block as usize].is_waiting = false;
-            blocks.targets.push(block);
-        }
-        blocks.targets.sort_unstable();
+        blocks.take_targets(count);
         let keep_within = (goes_on && !all).then_some(tolerance);
         self.update_responses(scene, keep_within);
         let blocks = &mut self.blocks;
