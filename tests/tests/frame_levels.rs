@@ -11,6 +11,7 @@ use mrt_core::storage::Storage;
 use mrt_runtime::assemble::{AssembleConfig, assemble};
 use mrt_runtime::dictionary::Dictionary;
 use mrt_runtime::frame::{Bounces, Frame, FrameConfig, Outputs};
+use mrt_runtime::level::Level;
 use mrt_runtime::light::Light;
 use mrt_runtime::maze::maze;
 use mrt_runtime::probes::ProbeOrder;
@@ -151,5 +152,22 @@ fn stored_operators_err_as_stated() {
                 "{bounces:?} {shapes:?} {transport:?} {negligible}: {apart:.1e}"
             );
         }
+    }
+}
+
+#[test]
+fn mirrors_that_would_fold_padding_are_left_out() {
+    // A straight block has three mirrors: 16² texels make orbits of eight, and at 6² half of eight times 32 slots would
+    // be padding.
+    let level = Level::from_cells(&[[0, 0, 0], [1, 0, 0], [2, 0, 0]], Vec3::ONE).expect("a row");
+    for (dictionary, mirrors, slots) in [
+        (default_dictionary(), 3, 4 * 16 * 16),
+        (mobile_dictionary(), 2, 4 * 48),
+    ] {
+        let scene = assemble(&level, dictionary, &AssembleConfig::default()).expect("it fits");
+        let folding = &scene.shapes[scene.blocks[1].shape_index].folding;
+        assert_eq!((folding.mirrors, folding.slots()), (mirrors, slots));
+        // Tiles of T_b->r need it.
+        assert!(folding.up_mirror.is_some_and(|k| k < folding.mirrors));
     }
 }

@@ -38,6 +38,8 @@ pub struct TransportTile {
     pub(crate) gated: u32,
     /// What sums are multiplied by.
     pub(crate) scale: f32,
+    /// Rows.
+    height: u8,
 }
 
 /// What one block sends to a tile.
@@ -274,6 +276,7 @@ impl<'a> TransportPacker<'a> {
                     entries: first_entry..packed.entries.len() as u32,
                     gated: gated as u32,
                     scale,
+                    height: rows.height,
                 });
             }
             packed
@@ -322,6 +325,21 @@ impl PackedTransport {
     /// Multiply-adds of one product, three channels: of what is kept, with padding, and of dense operators of all pairs.
     pub fn multiply_adds(&self) -> [usize; 2] {
         [self.multiply_adds, self.dense_multiply_adds]
+    }
+
+    /// The same of what is kept, where only some blocks have light: `is_lit[place]`, places as in
+    /// [`Layout::rank`](crate::scene::Layout).
+    ///
+    /// # Panics
+    /// If there are fewer places than blocks.
+    pub fn multiply_adds_from(&self, is_lit: &[bool]) -> usize {
+        let of_tile = |tile: &TransportTile| {
+            let entries = &self.entries[tile.entries.start as usize..tile.entries.end as usize];
+            let lit = entries.iter().filter(|e| is_lit[e.source as usize]);
+            let columns: usize = lit.map(|entry| entry.columns.len()).sum();
+            3 * columns * usize::from(tile.height)
+        };
+        self.tiles.iter().map(of_tile).sum()
     }
 
     /// Blocks that a block sends light to.

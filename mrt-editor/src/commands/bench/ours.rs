@@ -292,13 +292,8 @@ impl Ours {
 
     /// Blocks that indirect light reached in the last frame.
     pub fn lit_blocks(&self) -> usize {
-        let indirect = self.frame.indirect();
-        let blocks = self.scene.blocks.iter().map(|block| &block.texels);
-        let is_lit = |texels: &&std::ops::Range<usize>| {
-            let values = &indirect[3 * texels.start..3 * texels.end];
-            values.iter().any(|&e| e > 0.0)
-        };
-        blocks.filter(is_lit).count()
+        let [_, _, indirect] = self.lit();
+        indirect.into_iter().filter(|&is_lit| is_lit).count()
     }
 
     /// Bytes that the scene and the frame hold while frames are computed.
@@ -316,53 +311,74 @@ impl Ours {
         [RGB_BYTES * layout.rows * layout.block_count(); 2]
     }
 
-    /// What each of [`STAGES`] has to do where every block is lit: the products as they are made, folded by mirrors and
-    /// without what is negligible.
+    /// What each of [`STAGES`] had to do for the light of the last frame: the products of blocks with light, folded by
+    /// mirrors and without what is negligible.
     pub fn costs(&self) -> [Cost; STAGES.len()] {
         let scene = &self.scene;
         let layout = &scene.layout;
-        let slots = (RGB_BYTES * layout.slot_count()) as f64;
-        let [b, joint] = self.signal_bytes().map(|bytes| bytes as f64);
-        let lightmap = size_of_val(self.frame.lightmap()) as f64;
-        let mut sums = [0.0; 2];
-        for &shape in &layout.shapes {
-            let of_block = scene.shapes[shape as usize].multiply_adds();
-            for (sum, products) in sums.iter_mut().zip(of_block) {
-                *sum += 2.0 * products as f64;
+        let [direct, coefficients, indirect] = self.lit();
+        let of_lit = |is_lit: &[bool], of_place: &dyn Fn(usize) -> f64| -> f64 {
+            let lit = (0..layout.block_count()).filter(|&place| is_lit[place]);
+            lit.map(of_place).sum()
+        };
+        let slots = |place: usize| (RGB_BYTES * layout.slots[place].len()) as f64;
+        let rows = |_| (RGB_BYTES * layout.rows) as f64;
+        let products = |stage: usize| {
+            move |place: usize| {
+                let shape = &scene.shapes[layout.shapes[place] as usize];
+                2.0 * shape.multiply_adds()[stage] as f64
             }
-        }
-        let [from_direct, to_texels] = sums;
+        };
+        let lightmap = size_of_val(self.frame.lightmap()) as f64;
         let mut operators = [0.0; 2];
         for shape in &scene.shapes {
             for (sum, bytes) in operators.iter_mut().zip(shape.stage_bytes()) {
                 *sum += bytes as f64;
             }
         }
-        let [transport, _] = scene.transport.multiply_adds();
+        let transport = scene.transport.multiply_adds_from(&coefficients) as f64;
+        let [of_all, _] = scene.transport.multiply_adds();
+        let share = transport / (of_all as f64).max(1.0);
+        let (b, joint) = (of_lit(&coefficients, &rows), of_lit(&indirect, &rows));
         [
             // Positions and normals in, direct light out.
             Cost {
                 flops: 0.0,
-                bytes: 3.0 * slots,
+                bytes: 3.0 * of_lit(&direct, &slots),
             },
             // Direct light and albedo in.
             Cost {
-                flops: from_direct,
-                bytes: operators[0] + 2.0 * slots + b,
+                flops: of_lit(&coefficients, &products(0)),
+                bytes: operators[0] + 2.0 * of_lit(&coefficients, &slots) + b,
             },
             Cost {
-                flops: 2.0 * transport as f64,
-                bytes: scene.transport.bytes() as f64 + b + joint,
+                flops: 2.0 * transport,
+                bytes: share * scene.transport.bytes() as f64 + b + joint,
             },
             Cost {
-                flops: to_texels,
-                bytes: operators[1] + joint + slots,
+                flops: of_lit(&indirect, &products(1)),
+                bytes: operators[1] + joint + of_lit(&indirect, &slots),
             },
             Cost {
                 flops: 0.0,
-                bytes: slots + lightmap,
+                bytes: of_lit(&indirect, &slots) + lightmap,
             },
         ]
+    }
+
+    /// By place: whether there are direct light, coefficients b and indirect light.
+    fn lit(&self) -> [Vec<bool>; 3] {
+        let frame = &self.frame;
+        let signals = [frame.direct(), frame.coefficients(), frame.indirect()];
+        let mut lit = [(); 3].map(|()| vec![false; self.scene.blocks.len()]);
+        for (block, &place) in self.scene.blocks.iter().zip(&self.scene.layout.rank) {
+            let ranges = [&block.texels, &block.coefficients, &block.texels];
+            for ((lit, signal), range) in lit.iter_mut().zip(&signals).zip(ranges) {
+                let values = &signal[3 * range.start..3 * range.end];
+                lit[place as usize] = values.iter().any(|&value| value != 0.0);
+            }
+        }
+        lit
     }
 }
 
