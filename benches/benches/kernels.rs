@@ -14,7 +14,6 @@ use mrt_core::simd::folded::{Albedo, Basis, Folded, Reflected, Unfolded, fold, u
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows};
 use mrt_core::simd::tiles::{
     CHANNELS, ColumnLists, Element, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
-    sum_two_tiles,
 };
 use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 
@@ -86,51 +85,32 @@ fn check(what: &str, found: f32, exact: f64, size: f64) {
 /// Columns of tiles, as they occur: coefficients of one class, of a block, of several blocks.
 const COLUMNS: [usize; 5] = [8, 16, 32, 64, 256];
 
-#[derive(Clone, Copy)]
-enum Tiles {
-    One,
-    Two,
-    Half,
-}
-
-/// Operands of the three kernels of tiles.
+/// Operands of the kernels of tiles.
 struct TileProduct<E> {
-    tiles: Tiles,
-    panels: [Aligned<E>; 2],
+    is_half: bool,
+    panel: Aligned<E>,
     lists: ColumnLists,
     x: Aligned<f32>,
     columns: usize,
 }
 
-struct RunTiles<'a, E>(&'a TileProduct<E>, &'a mut [TileSums; 2]);
+struct RunTile<'a, E>(&'a TileProduct<E>, &'a mut TileSums);
 
-impl<E: Number> Kernel for RunTiles<'_, E> {
+impl<E: Number> Kernel for RunTile<'_, E> {
     type Output = ();
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {
-        let (product, sums) = (self.0, self.1);
-        let columns = product.lists.get(0..product.columns);
-        let x = Rgb::new(&product.x, product.columns);
-        let panels = [&product.panels[0][..], &product.panels[1][..]];
-        let scales = &[];
-        let one = Term {
-            panels: [panels[0]],
-            columns,
-            x,
-            scales,
-        };
-        let two = Term {
-            panels,
-            columns,
-            x,
-            scales,
-        };
-        let [first, second] = sums;
-        let [first, second] = [out(first), out(second)];
-        match product.tiles {
-            Tiles::One => sum_tile(l, std::iter::once(one), None, first),
-            Tiles::Half => sum_half_tile(l, std::iter::once(one), None, first),
-            Tiles::Two => sum_two_tiles(l, two, [first, second]),
+        let (product, sums) = (self.0, out(self.1));
+        let term = std::iter::once(Term {
+            panel: &product.panel,
+            columns: product.lists.get(0..product.columns),
+            x: Rgb::new(&product.x, product.columns),
+            scales: &[],
+        });
+        if product.is_half {
+            sum_half_tile(l, term, None, sums);
+        } else {
+            sum_tile(l, term, None, sums);
         }
     }
 }
@@ -139,47 +119,34 @@ fn out(sums: &mut TileSums) -> TileOut<'_> {
     sums.each_mut().map(|channel| &mut channel[..])
 }
 
-fn tiles<E: Number>(bencher: Bencher, tiles: Tiles, columns: usize) {
-    let (count, rows) = match tiles {
-        Tiles::One => (1, TILE),
-        Tiles::Two => (2, TILE),
-        Tiles::Half => (1, HALF_TILE),
-    };
-    let number = |panel: usize, k: usize| small(k + 1000 * panel);
-    let panels = [0, 1].map(|panel| {
-        (0..columns * rows)
-            .map(|k| E::of(number(panel, k)))
-            .collect()
-    });
+fn tile<E: Number>(bencher: Bencher, is_half: bool, columns: usize) {
+    let rows = if is_half { HALF_TILE } else { TILE };
     let mut lists = ColumnLists::default();
     lists.push(0..columns as u32);
-    let x = light(CHANNELS * columns);
     let product = TileProduct {
-        tiles,
-        panels,
+        is_half,
+        panel: (0..columns * rows).map(|k| E::of(small(k))).collect(),
         lists,
-        x,
+        x: light(CHANNELS * columns),
         columns,
     };
-    let mut sums = [[[0.0; TILE]; CHANNELS]; 2];
-    level().run(RunTiles(&product, &mut sums));
-    for (panel, sums) in sums.iter().enumerate().take(count) {
-        for (channel, sums) in sums.iter().enumerate() {
-            for (row, &found) in sums.iter().enumerate().take(rows) {
-                let (mut exact, mut size) = (0.0, 0.0);
-                for k in 0..columns {
-                    let a = f64::from(number(panel, k * rows + row));
-                    let term = a * f64::from(product.x[channel * columns + k]);
-                    exact += term;
-                    size += term.abs();
-                }
-                check(E::NAME, found, exact, size);
+    let mut sums = [[0.0; TILE]; CHANNELS];
+    level().run(RunTile(&product, &mut sums));
+    for (channel, sums) in sums.iter().enumerate() {
+        for (row, &found) in sums.iter().enumerate().take(rows) {
+            let (mut exact, mut size) = (0.0, 0.0);
+            for k in 0..columns {
+                let a = f64::from(small(k * rows + row));
+                let term = a * f64::from(product.x[channel * columns + k]);
+                exact += term;
+                size += term.abs();
             }
+            check(E::NAME, found, exact, size);
         }
     }
     bencher
-        .counter(ItemsCount::new(count * rows * columns * CHANNELS))
-        .bench_local(|| level_run(RunTiles(black_box(&product), black_box(&mut sums))));
+        .counter(ItemsCount::new(rows * columns * CHANNELS))
+        .bench_local(|| level_run(RunTile(black_box(&product), black_box(&mut sums))));
 }
 
 /// [`SimdLevel::run`] with the level read once.
@@ -189,18 +156,13 @@ fn level_run<K: Kernel>(kernel: K) -> K::Output {
 }
 
 #[divan::bench(name = "sum_tile", types = [f32, u16, i8], args = COLUMNS)]
-fn one_tile<E: Number>(bencher: Bencher, columns: usize) {
-    tiles::<E>(bencher, Tiles::One, columns);
-}
-
-#[divan::bench(name = "sum_two_tiles", types = [f32, u16, i8], args = COLUMNS)]
-fn two_tiles<E: Number>(bencher: Bencher, columns: usize) {
-    tiles::<E>(bencher, Tiles::Two, columns);
+fn whole_tile<E: Number>(bencher: Bencher, columns: usize) {
+    tile::<E>(bencher, false, columns);
 }
 
 #[divan::bench(name = "sum_half_tile", types = [f32, u16, i8], args = COLUMNS)]
 fn half_tile<E: Number>(bencher: Bencher, columns: usize) {
-    tiles::<E>(bencher, Tiles::Half, columns);
+    tile::<E>(bencher, true, columns);
 }
 
 // ---- Rows ----
@@ -445,33 +407,23 @@ impl Kernel for TiledProduct<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {
         let [m, k, n] = self.size;
-        let panel = |tile: usize| &self.panels[tile * TILE * k..(tile + 1) * TILE * k];
         let columns = self.lists.get(0..k);
-        let mut first = 0;
-        while first < n {
+        for first in (0..n).step_by(CHANNELS) {
             let x = Rgb::new(&self.b[first * k..(first + CHANNELS) * k], k);
-            let mut row = 0;
-            while row < m {
-                let mut sums = [[[0.0; TILE]; CHANNELS]; 2];
-                let tile = row / TILE;
-                let panels = [panel(tile), panel(tile + 1)];
+            for row in (0..m).step_by(TILE) {
+                let mut sums = [[0.0; TILE]; CHANNELS];
                 let term = Term {
-                    panels,
+                    panel: &self.panels[row * k..(row + TILE) * k],
                     columns,
                     x,
                     scales: &[],
                 };
-                let [upper, lower] = &mut sums;
-                sum_two_tiles(l, term, [out(upper), out(lower)]);
-                for (tile, sums) in sums.iter().enumerate() {
-                    for (channel, sums) in sums.iter().enumerate() {
-                        let at = (first + channel) * m + row + tile * TILE;
-                        self.out[at..at + TILE].copy_from_slice(sums);
-                    }
+                sum_tile(l, std::iter::once(term), None, out(&mut sums));
+                for (channel, sums) in sums.iter().enumerate() {
+                    let at = (first + channel) * m + row;
+                    self.out[at..at + TILE].copy_from_slice(sums);
                 }
-                row += 2 * TILE;
             }
-            first += CHANNELS;
         }
     }
 }

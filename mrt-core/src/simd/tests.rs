@@ -129,6 +129,7 @@ struct Tile<'a, E> {
     columns: tiles::Columns<'a>,
     x: &'a [f32],
     is_half: bool,
+    finish: Option<tiles::Finish<'a>>,
 }
 
 impl<E: tiles::Element> Kernel for Tile<'_, E> {
@@ -138,37 +139,16 @@ impl<E: tiles::Element> Kernel for Tile<'_, E> {
         let mut sums = [[0.5; tiles::TILE]; 3];
         let x = tiles::Rgb::new(self.x, self.x.len() / 3);
         let columns = self.columns;
-        let panels = [self.panel];
         let once = std::iter::once(tiles::Term {
-            panels,
+            panel: self.panel,
             columns,
             x,
             scales: &[],
         });
         if self.is_half {
-            tiles::sum_half_tile(l, once, None, out(&mut sums));
+            tiles::sum_half_tile(l, once, self.finish, out(&mut sums));
         } else {
-            let mut twice = [[[f32::NAN; tiles::TILE]; 3]; 2];
-            let [first, second] = &mut twice;
-            let panels = [self.panel; 2];
-            tiles::sum_two_tiles(
-                l,
-                tiles::Term {
-                    panels,
-                    columns,
-                    x,
-                    scales: &[],
-                },
-                [out(first), out(second)],
-            );
-            tiles::sum_tile(l, once, None, out(&mut sums));
-            // The same panel three times; sums of columns may be taken in another order.
-            for (pair, single) in twice[0].iter().zip(&sums) {
-                for (a, b) in pair.iter().zip(single) {
-                    assert!((a - b).abs() < 2e-6);
-                }
-            }
-            assert_eq!(twice[0], twice[1]);
+            tiles::sum_tile(l, once, self.finish, out(&mut sums));
         }
         sums
     }
@@ -202,26 +182,42 @@ fn tiles_are_products_at_every_level_for_every_number_of_columns() {
         let range = lists.push(columns.iter().copied());
         let x = numbers(36);
         let panel = numbers(count * 16);
+        let others = numbers(64);
         for (is_half, rows) in [(false, 16), (true, 8)] {
             for level in SimdLevel::available() {
-                let found = level.run(Tile {
-                    panel: &panel,
-                    columns: lists.get(range.clone()),
-                    x: &x,
-                    is_half,
-                });
+                let run = |finish| {
+                    level.run(Tile {
+                        panel: &panel,
+                        columns: lists.get(range.clone()),
+                        x: &x,
+                        is_half,
+                        finish,
+                    })
+                };
+                let factors = &others[..rows];
+                let own = [1, 2, 3].map(|channel| &others[16 * channel..][..rows]);
+                let scale = 0.75;
+                let finish = tiles::Finish {
+                    scale,
+                    factors,
+                    own,
+                };
+                let (found, finished) = (run(None), run(Some(finish)));
                 for channel in 0..3 {
-                    for row in 0..16 {
+                    // Rows beyond a half tile are nobody's.
+                    for row in 0..rows {
                         let product = |(k, &column): (usize, &u32)| {
                             let x = x[channel * 12 + column as usize];
                             f64::from(panel[k * rows + row]) * f64::from(x)
                         };
                         let sum: f64 = columns.iter().enumerate().map(product).sum();
-                        // Rows beyond a half tile are nobody's.
-                        let expected = if row < rows { sum } else { continue };
-                        let apart = (f64::from(found[channel][row]) - expected).abs();
-                        // Numbers of size 1, twelve roundings of 6e-8.
-                        assert!(apart < 2e-6, "{level:?}, {count} columns: {apart}");
+                        let factor = f64::from(scale) * f64::from(factors[row]);
+                        let expected = [sum, sum * factor + f64::from(own[channel][row])];
+                        for (found, expected) in [found, finished].iter().zip(expected) {
+                            let apart = (f64::from(found[channel][row]) - expected).abs();
+                            // Numbers of size 1, fourteen roundings of 6e-8.
+                            assert!(apart < 2e-6, "{level:?}, {count} columns: {apart}");
+                        }
                     }
                 }
             }

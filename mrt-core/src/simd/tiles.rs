@@ -24,8 +24,6 @@ pub const CHANNELS: usize = 3;
 
 /// A number as operators are stored.
 pub trait Element: Copy + Send + Sync + 'static {
-    /// Whether loading takes more than a load.
-    const CONVERTED: bool = true;
     /// Whether columns may have scales.
     const SCALED: bool = false;
     /// Loads `L::N` of them as `f32`, without scale.
@@ -33,8 +31,6 @@ pub trait Element: Copy + Send + Sync + 'static {
 }
 
 impl Element for f32 {
-    const CONVERTED: bool = false;
-
     #[inline(always)]
     fn load<L: Lanes>(lanes: L, from: &[f32]) -> L::V {
         lanes.load(from)
@@ -140,9 +136,9 @@ pub type TileOut<'a> = [&'a mut [f32]; CHANNELS];
 
 /// A panel of a tile's columns, and what they are multiplied by.
 #[derive(Clone, Copy, Debug)]
-pub struct Term<'a, E, const PANELS: usize = 1> {
-    /// Numbers of each tile, column after column.
-    pub panels: [&'a [E]; PANELS],
+pub struct Term<'a, E> {
+    /// Numbers of the tile, column after column.
+    pub panel: &'a [E],
     /// Which numbers of `x` the columns belong to.
     pub columns: Columns<'a>,
     /// The right-hand sides.
@@ -184,44 +180,10 @@ pub fn sum_tile<'a, L: Lanes, E: Element>(
     sums: TileOut<'_>,
 ) {
     match L::N {
-        4 => sum_rows::<L, E, 1, 4, 1, TILE>(l, terms, finish, [sums]),
-        8 => sum_rows::<L, E, 1, 2, 2, TILE>(l, terms, finish, [sums]),
-        16 => sum_rows::<L, E, 1, 1, 2, TILE>(l, terms, finish, [sums]),
+        4 => sum_rows::<L, E, 4, 1, TILE>(l, terms, finish, sums),
+        8 => sum_rows::<L, E, 2, 2, TILE>(l, terms, finish, sums),
+        16 => sum_rows::<L, E, 1, 2, TILE>(l, terms, finish, sums),
         _ => sum_rows_one_by_one::<L, E, TILE>(l, terms, finish, sums),
-    }
-}
-
-/// [`sum_tile`] for two tiles with the same columns, and one term: half the loads of `x`.
-///
-/// # Panics
-/// As [`sum_tile`].
-#[inline(always)]
-pub fn sum_two_tiles<L: Lanes, E: Element>(l: L, term: Term<'_, E, 2>, sums: [TileOut<'_>; 2]) {
-    let once = std::iter::once(term);
-    match L::N {
-        8 => sum_rows::<L, E, 2, 2, 1, TILE>(l, once, None, sums),
-        16 => sum_rows::<L, E, 2, 1, 2, TILE>(l, once, None, sums),
-        // Four lanes would need more registers than there are.
-        _ => {
-            let [first, second] = sums;
-            let Term {
-                panels,
-                columns,
-                x,
-                scales,
-            } = term;
-            let half = |k: usize| {
-                let panels = [panels[k]];
-                std::iter::once(Term {
-                    panels,
-                    columns,
-                    x,
-                    scales,
-                })
-            };
-            sum_tile(l, half(0), None, first);
-            sum_tile(l, half(1), None, second);
-        }
     }
 }
 
@@ -238,33 +200,32 @@ pub fn sum_half_tile<'a, L: Lanes, E: Element>(
 ) {
     let l = l.narrow();
     match <L::Narrow as Lanes>::N {
-        4 => sum_rows::<_, E, 1, 2, 2, HALF_TILE>(l, terms, finish, [sums]),
-        8 => sum_rows::<_, E, 1, 1, 2, HALF_TILE>(l, terms, finish, [sums]),
+        4 => sum_rows::<_, E, 2, 2, HALF_TILE>(l, terms, finish, sums),
+        8 => sum_rows::<_, E, 1, 2, HALF_TILE>(l, terms, finish, sums),
         _ => sum_rows_one_by_one::<_, E, HALF_TILE>(l, terms, finish, sums),
     }
 }
 
-/// `VECTORS` vectors make the `ROWS` of each of `PANELS` panels; `SETS` columns go to sums of their own, so that enough
+/// `VECTORS` vectors make the `ROWS` of a panel; `SETS` columns go to sums of their own, so that enough
 /// products are under way at once to hide the time that each takes.
 #[inline(always)]
 fn sum_rows<
     'a,
     L: Lanes,
     E: Element,
-    const PANELS: usize,
     const VECTORS: usize,
     const SETS: usize,
     const ROWS: usize,
 >(
     l: L,
-    terms: impl Iterator<Item = Term<'a, E, PANELS>>,
+    terms: impl Iterator<Item = Term<'a, E>>,
     finish: Option<Finish<'_>>,
-    sums: [TileOut<'_>; PANELS],
+    sums: TileOut<'_>,
 ) {
     assert_eq!(VECTORS * L::N, ROWS);
-    let mut acc = [[[[l.splat(0.0); VECTORS]; CHANNELS]; PANELS]; SETS];
+    let mut acc = [[[l.splat(0.0); VECTORS]; CHANNELS]; SETS];
     for Term {
-        panels,
+        panel,
         columns,
         x,
         scales,
@@ -273,9 +234,7 @@ fn sum_rows<
         let count = columns.indices.len();
         assert!(x.has(columns.limit));
         assert!(scales.is_empty() || scales.len() >= count);
-        for panel in panels {
-            assert!(panel.len() >= count * ROWS);
-        }
+        assert!(panel.len() >= count * ROWS);
         let whole = count / SETS * SETS;
         let mut k = 0;
         if E::SCALED && !scales.is_empty() {
@@ -283,15 +242,7 @@ fn sum_rows<
                 // SAFETY: k < count, and all else was checked above.
                 unsafe {
                     let scale = *scales.get_unchecked(k);
-                    add_column::<L, E, PANELS, VECTORS, ROWS>(
-                        l,
-                        panels,
-                        columns,
-                        k,
-                        x,
-                        scale,
-                        &mut acc[0],
-                    );
+                    add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k, x, scale, &mut acc[0]);
                 }
                 k += 1;
             }
@@ -300,15 +251,7 @@ fn sum_rows<
             for (set, acc) in acc.iter_mut().enumerate() {
                 // SAFETY: k + set < count, and all else was checked above.
                 unsafe {
-                    add_column::<L, E, PANELS, VECTORS, ROWS>(
-                        l,
-                        panels,
-                        columns,
-                        k + set,
-                        x,
-                        1.0,
-                        acc,
-                    );
+                    add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k + set, x, 1.0, acc);
                 }
             }
             k += SETS;
@@ -316,33 +259,23 @@ fn sum_rows<
         while k < count {
             // SAFETY: as above.
             unsafe {
-                add_column::<L, E, PANELS, VECTORS, ROWS>(
-                    l,
-                    panels,
-                    columns,
-                    k,
-                    x,
-                    1.0,
-                    &mut acc[0],
-                );
+                add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k, x, 1.0, &mut acc[0]);
             }
             k += 1;
         }
     }
-    for (panel, sums) in sums.into_iter().enumerate() {
-        for (channel, out) in sums.into_iter().enumerate() {
-            let out = &mut out[..ROWS];
-            for v in 0..VECTORS {
-                let mut sum = acc[0][panel][channel][v];
-                for other in &acc[1..] {
-                    sum = l.add(sum, other[panel][channel][v]);
-                }
-                let at = v * L::N;
-                if let Some(finish) = &finish {
-                    sum = finish.apply(l, channel, at, sum);
-                }
-                l.store(&mut out[at..at + L::N], sum);
+    for (channel, out) in sums.into_iter().enumerate() {
+        let out = &mut out[..ROWS];
+        for v in 0..VECTORS {
+            let mut sum = acc[0][channel][v];
+            for other in &acc[1..] {
+                sum = l.add(sum, other[channel][v]);
             }
+            let at = v * L::N;
+            if let Some(finish) = &finish {
+                sum = finish.apply(l, channel, at, sum);
+            }
+            l.store(&mut out[at..at + L::N], sum);
         }
     }
 }
@@ -350,23 +283,17 @@ fn sum_rows<
 /// `acc += panel[k] * scale * x[columns[k]]`, the scale for `int8` only.
 ///
 /// # Safety
-/// `k` is below the number of columns, each panel has `ROWS` numbers for each of them, `VECTORS` vectors make `ROWS`, and
+/// `k` is below the number of columns, the panel has `ROWS` numbers for each of them, `VECTORS` vectors make `ROWS`, and
 /// `x` has three numbers for every index below the columns' limit.
 #[inline(always)]
-unsafe fn add_column<
-    L: Lanes,
-    E: Element,
-    const PANELS: usize,
-    const VECTORS: usize,
-    const ROWS: usize,
->(
+unsafe fn add_column<L: Lanes, E: Element, const VECTORS: usize, const ROWS: usize>(
     l: L,
-    panels: [&[E]; PANELS],
+    panel: &[E],
     columns: Columns<'_>,
     k: usize,
     x: Rgb<'_>,
     scale: f32,
-    acc: &mut [[[L::V; VECTORS]; CHANNELS]; PANELS],
+    acc: &mut [[L::V; VECTORS]; CHANNELS],
 ) {
     // SAFETY: the caller's promises.
     let (red, green, blue) = unsafe {
@@ -379,19 +306,17 @@ unsafe fn add_column<
     } else {
         [red, green, blue]
     };
-    for (panel, acc) in panels.iter().zip(acc) {
-        let mut a = [l.splat(0.0); VECTORS];
-        for (v, a) in a.iter_mut().enumerate() {
-            let at = k * ROWS + v * L::N;
-            // SAFETY: the caller's promises.
-            *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
-        }
-        // One channel after another: eight lanes have registers for one of `x` besides two sets of sums.
-        for channel in 0..CHANNELS {
-            let x = l.splat(x[channel]);
-            for v in 0..VECTORS {
-                acc[channel][v] = l.mul_add(a[v], x, acc[channel][v]);
-            }
+    let mut a = [l.splat(0.0); VECTORS];
+    for (v, a) in a.iter_mut().enumerate() {
+        let at = k * ROWS + v * L::N;
+        // SAFETY: the caller's promises.
+        *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
+    }
+    // One channel after another: eight lanes have registers for one of `x` besides two sets of sums.
+    for channel in 0..CHANNELS {
+        let x = l.splat(x[channel]);
+        for v in 0..VECTORS {
+            acc[channel][v] = l.mul_add(a[v], x, acc[channel][v]);
         }
     }
 }
@@ -411,13 +336,13 @@ fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
         sums.fill(0.0);
     }
     for Term {
-        panels,
+        panel,
         columns,
         x,
         scales,
     } in terms
     {
-        let panel = &panels[0][..columns.indices.len() * ROWS];
+        let panel = &panel[..columns.indices.len() * ROWS];
         for (channel, sums) in sums.iter_mut().enumerate() {
             let x = &x.values[channel * x.stride..];
             for (row, sum) in sums.iter_mut().enumerate() {

@@ -6,7 +6,6 @@ use mrt_core::simd::folded::{Albedo, Basis, Reflected, fold, unfold};
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows, dot_unlike_rows};
 use mrt_core::simd::tiles::{
     CHANNELS, Element, Finish, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
-    sum_two_tiles,
 };
 use mrt_core::simd::{Aligned, Kernel, Lanes, WIDEST};
 use std::ops::Range;
@@ -295,7 +294,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
             own: [&own[place(0)], &own[place(1)], &own[place(2)]],
         };
         let term = |(columns, start): (Range<usize>, usize)| Term {
-            panels: [&values[start..start + columns.len() * rows]],
+            panel: &values[start..start + columns.len() * rows],
             columns: transport.columns.get(columns.clone()),
             x,
             scales: transport.column_scales.get(columns).unwrap_or(&[]),
@@ -493,37 +492,20 @@ fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
         scale_joint(&basis.scales, x, &mut job.scratch.scaled);
         x = &job.scratch.scaled[..x.len()];
     }
-    let mut row = 0;
-    while row < job.rows {
-        let panel = |tile: usize| &values[tile * TILE * count..(tile + 1) * TILE * count];
-        let mut sums = [[[0.0f32; TILE]; CHANNELS]; 2];
-        let [[r0, g0, b0], [r1, g1, b1]] = &mut sums;
-        let pair = row + TILE < job.rows;
-        let tile = row / TILE;
-        let x = Rgb::new(x, x.len() / CHANNELS);
-        if pair {
-            let term = Term {
-                panels: [panel(tile), panel(tile + 1)],
-                columns,
-                x,
-                scales: &[],
-            };
-            sum_two_tiles(l, term, [[r0, g0, b0], [r1, g1, b1]]);
-        } else {
-            let term = Term {
-                panels: [panel(tile)],
-                columns,
-                x,
-                scales: &[],
-            };
-            sum_tile(l, std::iter::once(term), None, [r0, g0, b0]);
-        }
-        for sums in sums.iter().take(1 + usize::from(pair)) {
-            let height = TILE.min(job.rows - row);
-            for (out, sums) in job.out.iter_mut().zip(sums) {
-                out[row..row + height].copy_from_slice(&sums[..height]);
-            }
-            row += height;
+    let x = Rgb::new(x, x.len() / CHANNELS);
+    for row in (0..job.rows).step_by(TILE) {
+        let mut sums = [[0.0f32; TILE]; CHANNELS];
+        let term = Term {
+            panel: &values[row * count..(row + TILE) * count],
+            columns,
+            x,
+            scales: &[],
+        };
+        let to = sums.each_mut().map(|sums| &mut sums[..]);
+        sum_tile(l, std::iter::once(term), None, to);
+        let height = TILE.min(job.rows - row);
+        for (out, sums) in job.out.iter_mut().zip(&sums) {
+            out[row..row + height].copy_from_slice(&sums[..height]);
         }
     }
 }
