@@ -124,7 +124,7 @@ pub enum AssembleError {
         /// The depth given.
         found: usize,
     },
-    /// More than all light may be left out, or what is no number.
+    /// A share of light to be left out that is not in [0, 1).
     #[error(
         "a share of {found} of light may be left out; expected one from 0 to below 1 (AssembleConfig::negligible)"
     )]

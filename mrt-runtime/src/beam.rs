@@ -68,8 +68,7 @@ impl PartialEq for Beam {
 pub struct BeamTracer {
     /// Openings that lead outside: the block, and which of its portals.
     outside: Vec<(u32, u32)>,
-    /// Beams to be followed further: the first [`BeamTracer::waiting`]. More stay for later, never more than there is
-    /// room for.
+    /// Beams to be followed further: the first [`BeamTracer::waiting`]. The others are kept for their memory.
     pending: Vec<Node>,
     waiting: usize,
     /// The one that is followed, what becomes of it beyond an opening, and its light there.

@@ -157,12 +157,13 @@ fn stored_operators_err_as_stated() {
 
 #[test]
 fn mirrors_that_would_fold_padding_are_left_out() {
-    // A straight block has three mirrors: 16² texels make orbits of eight, and at 6² half of eight times 32 slots would
-    // be padding.
+    // A straight block has three mirrors: 16² texels make orbits of eight, and at 6² and 5² nearly half of eight times 32
+    // slots would be padding.
     let level = Level::from_cells(&[[0, 0, 0], [1, 0, 0], [2, 0, 0]], Vec3::ONE).expect("a row");
     for (dictionary, mirrors, slots) in [
         (default_dictionary(), 3, 4 * 16 * 16),
         (mobile_dictionary(), 2, 4 * 48),
+        (vector_dictionary(), 2, 4 * 32),
     ] {
         let scene = assemble(&level, dictionary, &AssembleConfig::default()).expect("it fits");
         let folding = &scene.shapes[scene.blocks[1].shape_index].folding;

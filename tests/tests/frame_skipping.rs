@@ -466,3 +466,41 @@ fn a_scene_with_larger_blocks_is_refused_or_solved() {
         }
     }
 }
+
+/// Light that is within the tolerance goes out with its lamp, whatever larger shapes the same task computed before.
+#[test]
+fn faint_light_of_small_shapes_goes_out() {
+    let cells = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [9, 0, 0]];
+    let level = Level::from_cells(&cells, Vec3::splat(0.02)).expect("a row, and a closed block");
+    let scene = mobile(&level);
+    let rows = |block: usize| scene.shapes[scene.blocks[block].shape_index].rows;
+    assert!(rows(3) < rows(1), "{} and {}", rows(3), rows(1));
+    let lamp = |block: usize, aside: f32| {
+        let middle = level.blocks[block].warp.center().as_vec3();
+        sphere(middle + Vec3::new(aside, 0.2, -0.15), 0.1, Vec3::ONE)
+    };
+    let mut exact = Frame::new(&scene);
+    let lights = [lamp(3, 0.1), lamp(1, 0.1)];
+    assert_eq!(
+        exact.solve(&scene, &lights, &Openings, Bounces::Count(1)),
+        Ok(())
+    );
+    let largest = |values: &[f32]| values.iter().fold(0.0f32, |m, &e| m.max(e));
+    let closed = scene.blocks[3].texels.clone();
+    let closed = 3 * closed.start..3 * closed.end;
+    let (direct, indirect) = (exact.direct(), exact.indirect());
+    let config = FrameConfig {
+        tolerance: 0.5 * largest(&direct[closed.clone()]),
+        ..FrameConfig::default()
+    };
+    assert!(largest(&indirect[closed.clone()]) < 0.2 * config.tolerance);
+    let mut frame = Frame::with_config(&scene, config);
+    // The second frame leaves what it summed up for the row of blocks behind.
+    for lights in [&lights[..], &[lights[0], lamp(1, -0.2)], &[lamp(1, -0.2)]] {
+        assert_eq!(
+            frame.solve(&scene, lights, &Openings, Bounces::Count(1)),
+            Ok(())
+        );
+    }
+    assert_eq!(largest(&frame.indirect()[closed]), 0.0);
+}

@@ -177,6 +177,6 @@ fn the_newest_version_has_not_changed_unnoticed() {
         written == bytes,
         "the format is another than that of assets/versions/{DICTIONARY_VERSION}.mrt; if that version has been \
          released, count DICTIONARY_VERSION up and keep reading the old one; otherwise run \
-         `mrt bake --preset mobile --out assets/versions/{DICTIONARY_VERSION}.mrt`"
+         `mrt bake --preset mobile --resolution 6 --out assets/versions/{DICTIONARY_VERSION}.mrt`"
     );
 }

@@ -34,7 +34,7 @@ fn f16_tolerance(coupling: Coupling) -> f64 {
 }
 const INT8_TOLERANCE: f64 = 5e-3;
 
-/// The mobile preset in the newest format.
+/// The mobile preset at 6² texels in the newest format.
 fn mobile() -> Dictionary {
     let bytes = include_bytes!("../../assets/versions/2.mrt");
     Dictionary::from_bytes(bytes, &mut ByteBudget::new(BYTE_BUDGET)).expect("the file is sound")

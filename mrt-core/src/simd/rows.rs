@@ -32,7 +32,8 @@ pub fn dot_rows<L: Lanes, E: Element>(
         1 => dot_some_rows::<L, E, 1, 4>(l, rows, x),
         2 => dot_some_rows::<L, E, 2, 2>(l, rows, x),
         3 => dot_some_rows::<L, E, 3, 1>(l, rows, x),
-        _ => dot_some_rows::<L, E, 4, 1>(l, rows, x),
+        4 => dot_some_rows::<L, E, 4, 1>(l, rows, x),
+        _ => panic!("{count} rows; expected 1 to {DOT_ROWS}"),
     }
 }
 

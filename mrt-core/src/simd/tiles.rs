@@ -63,14 +63,21 @@ pub struct Rgb<'a> {
 
 impl<'a> Rgb<'a> {
     /// Vectors of `stride` numbers, red, green and blue; more of such triples may follow.
+    ///
+    /// # Panics
+    /// If `stride` is larger than the number of values.
+    #[inline(always)]
     pub fn new(values: &'a [f32], stride: usize) -> Self {
+        // So that multiples of it do not wrap around.
+        assert!(stride <= values.len(), "stride");
         Self { values, stride }
     }
 
     /// Whether every index below `limit` has its three numbers.
     #[inline(always)]
     pub(super) fn has(&self, limit: usize) -> bool {
-        limit == 0 || limit + (CHANNELS - 1) * self.stride <= self.values.len()
+        let before_last = (CHANNELS - 1) * self.stride;
+        limit == 0 || limit.saturating_add(before_last) <= self.values.len()
     }
 }
 
@@ -95,7 +102,9 @@ impl ColumnLists {
         let start = self.indices.len();
         self.indices.extend(columns);
         let largest = self.indices[start..].iter().copied().max();
-        self.limit = self.limit.max(largest.map_or(0, |k| k as usize + 1));
+        self.limit = self
+            .limit
+            .max(largest.map_or(0, |k| (k as usize).saturating_add(1)));
         start..self.indices.len()
     }
 

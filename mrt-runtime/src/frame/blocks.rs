@@ -1,4 +1,5 @@
-//! What a frame knows about each block, and lists of those that count: no step looks at all blocks.
+//! What a frame knows about each block, and lists of those that count: no step looks at all blocks unless an eighth of them
+//! is to be computed.
 
 use super::kernels::{Arrived, Flux};
 use super::pass::Kept;

@@ -59,7 +59,7 @@ pub struct FrameConfig {
     /// to the world's axes five at a time, by √5 times that. At 0, the
     /// default, what is kept is kept because nothing about it changed, bit by bit; with feedback, rounding then changes
     /// the last bits for ever, and some 1e-6 of the brightest irradiance lets static light come to rest. With 1e-3 of the
-    /// brightest, one moving lamp of four in a maze of 41 blocks takes 0.37 of the time of all.
+    /// brightest, one moving lamp of four in a maze of 41 blocks takes 0.39 of the time of all.
     pub tolerance: f32,
     /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
     /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long

@@ -2,7 +2,7 @@
 
 use super::blocks::Blocks;
 use super::limit::limit_flux;
-use super::tasks::{Lit, Receivers, Senders};
+use super::tasks::{Receivers, Senders, Unfolding};
 use super::{Bounces, Frame, MAX_PASSES};
 use crate::executor::{run_parts, task_count};
 use crate::scene::{Planes, Scene};
@@ -297,7 +297,7 @@ impl Frame {
             let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
             let span = span(list);
             let slots = layout.slots[span.start].start..layout.slots[span.end - 1].end;
-            Some(Lit {
+            Some(Unfolding {
                 scene,
                 list,
                 first: span.start,

@@ -110,8 +110,9 @@ impl Kernel for Receivers<'_> {
             let now = &self.scratch.joint[..];
             let before = &*kept;
             let change = ChangeOf { shape, before, now }.run(l);
-            // What goes dark goes dark.
-            let goes_dark = change > 0.0 && now.iter().all(|&r| r == 0.0);
+            // What goes dark goes dark. Rows beyond the shape's are those of another block.
+            let is_dark = |row: &[f32]| row[..shape.rows].iter().all(|&r| r == 0.0);
+            let goes_dark = change > 0.0 && now.chunks_exact(layout.rows).all(is_dark);
             if change <= most && !goes_dark {
                 (state.is_kept, state.lag) = (true, change);
             } else {
@@ -122,7 +123,7 @@ impl Kernel for Receivers<'_> {
 }
 
 /// Indirect light of a list of blocks, one task.
-pub(super) struct Lit<'a> {
+pub(super) struct Unfolding<'a> {
     pub scene: &'a Scene,
     pub list: &'a [u32],
     pub first: usize,
@@ -135,7 +136,7 @@ pub(super) struct Lit<'a> {
     pub scratch: &'a mut Scratch,
 }
 
-impl Kernel for Lit<'_> {
+impl Kernel for Unfolding<'_> {
     type Output = ();
 
     #[inline(always)]

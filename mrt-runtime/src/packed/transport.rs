@@ -252,9 +252,10 @@ impl<'a> TransportPacker<'a> {
                 }
                 let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
                 if let Some(last) = entries[gated..].last() {
-                    // Kernels take columns in pairs: a column of zeros makes the run of what passes no gate even.
+                    // Kernels of 8 and 16 lanes take columns in pairs: a column of zeros makes the run of all that passes no
+                    // gate even.
                     let columns: usize = entries[gated..].iter().map(|p| p.columns.len()).sum();
-                    if columns % 2 == 1 {
+                    if columns % 2 == 1 && self.storage != Storage::Int8 {
                         let column = last.source * self.block_stride;
                         let end = packed.columns.push([column]).end;
                         packed
@@ -265,9 +266,6 @@ impl<'a> TransportPacker<'a> {
                             .end = end as u32;
                         for _ in 0..height {
                             values.push(0.0, 1.0);
-                        }
-                        if self.storage == Storage::Int8 {
-                            packed.column_scales.push(1.0);
                         }
                         packed.multiply_adds += 3 * height;
                     }

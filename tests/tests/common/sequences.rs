@@ -38,7 +38,8 @@ pub fn vector_dictionary() -> &'static Dictionary {
     static DICTIONARY: OnceLock<Dictionary> = OnceLock::new();
     DICTIONARY.get_or_init(|| {
         let mut config = BakeConfig::preset("mobile").expect("a preset");
-        config.resolution = 4;
+        // Odd, so that texels lie on mirrors' planes.
+        config.resolution = 5;
         config.modes = 8;
         config.coupling.emission_modes = 8;
         config.coupling.response_modes = 8;
