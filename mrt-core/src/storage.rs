@@ -28,7 +28,7 @@ pub use half::f16;
 pub use sections::{StoredSection, read_stored, write_stored};
 
 use crate::container::ElementType;
-use crate::matrix::Matrix;
+use crate::linalg::matrix::Matrix;
 use std::borrow::Cow;
 
 /// How the numbers of a matrix are stored.

@@ -7,7 +7,7 @@ mod glb;
 mod obj;
 
 use glam::{DAffine3, DVec3, Vec3};
-use mrt_core::mesh::{self, Material, MeshReport, TriangleMesh, Y_UP_FROM_Z_UP};
+use mrt_core::geometry::mesh::{self, Material, MeshReport, TriangleMesh, Y_UP_FROM_Z_UP};
 use serde::Serialize;
 use std::io::Read;
 use std::path::{Path, PathBuf};

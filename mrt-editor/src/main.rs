@@ -1,7 +1,7 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::commands::{accuracy, adapt, bake, bench, demo, figures, info, light, map, pack};
+use mrt_editor::cli::{accuracy, adapt, bake, bench, demo, figures, info, light, map, pack};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps

@@ -13,10 +13,10 @@ pub mod unwrap;
 use cube_camera::CubeCamera;
 use glam::{DVec3, Vec3};
 use lookup::Lookup;
-use mrt_core::bvh::Bvh;
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::tube::TubeForm;
-use mrt_runtime::level::{Block, Level};
+use mrt_core::geometry::bvh::Bvh;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::tube::TubeForm;
+use mrt_runtime::level::block::{Block, Level};
 use trilinear::Trilinear;
 
 /// A point of a block's wall.

@@ -1,6 +1,6 @@
 //! The `mrt` program as a user meets it: exit codes, messages, and files that are whole or not there.
 
-use mrt_tests::oracle_file::oracle_folder_or_report;
+use mrt_core::reference::oracle_file::oracle_folder_or_report;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;

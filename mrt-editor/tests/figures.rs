@@ -1,8 +1,8 @@
 //! `mrt figures` as a user meets it: what needs no reference files is drawn anywhere, and what needs them
 //! says so.
 
-use mrt_dictionary::bake::bake;
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
 use serde_json::Value;
 use std::fs;

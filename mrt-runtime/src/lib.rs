@@ -1,25 +1,26 @@
 //! Modular Radiance Transfer at run time (Loos et al., "Modular Radiance Transfer", SIGGRAPH Asia
 //! 2011), in the order in which data flows.
 //!
-//! A [`shape`] is a cube with faces missing, and a [`dictionary`] holds the baked operators of shapes. A
-//! [`level`] places warped shapes and joins their openings; [`assemble`] turns both into a [`scene`],
-//! which a game keeps. Every frame takes [`light`]s through [`direct`] light and the reduced operators
-//! to indirect irradiance ([`frame`]) and copies it to a lightmap [`atlas`].
+//! A [`shape`](level::shape) is a cube with faces missing, and a [`dictionary`](modular::dictionary) holds the baked
+//! operators of shapes. A [`level`] places warped shapes and joins their openings; [`assemble`](modular::assemble) turns
+//! both into a [`scene`](modular::scene), which a game keeps. Every frame takes [`light`]s through
+//! [direct light](light::direct_light) and the reduced operators to indirect irradiance ([`frame`](modular::frame)) and
+//! copies it to a [lightmap](output::lightmap_atlas).
 //!
 //! ```
 //! use glam::{Vec3, vec3};
 //! use mrt_core::container::ByteBudget;
-//! use mrt_runtime::assemble::{AssembleConfig, assemble};
-//! use mrt_runtime::dictionary::Dictionary;
-//! use mrt_runtime::frame::{Bounces, Frame};
-//! use mrt_runtime::level_text;
-//! use mrt_runtime::light::Light;
-//! use mrt_runtime::visibility::Openings;
+//! use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+//! use mrt_runtime::modular::dictionary::Dictionary;
+//! use mrt_runtime::modular::frame::{Bounces, Frame};
+//! use mrt_runtime::level::text;
+//! use mrt_runtime::light::placed::Light;
+//! use mrt_runtime::light::visibility::Openings;
 //!
 //! // Once: a dictionary, a level, the scene that both make, and the buffers of its frames.
 //! let bytes = include_bytes!("../../assets/cubes-2d-standard.mrt");
 //! let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20))?;
-//! let level = level_text::from_text(include_str!("../../assets/maze.level.toml"))?;
+//! let level = text::from_text(include_str!("../../assets/maze.level.toml"))?;
 //! let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
 //! let mut frame = Frame::new(&scene);
 //!
@@ -39,28 +40,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub mod shape;
-pub mod wall;
-pub mod path;
 pub mod level;
-pub mod level_text;
-pub mod maze;
-pub mod form;
-mod overlap;
-pub mod dictionary;
-pub mod dictionary_file;
-pub mod mirrors;
-pub mod packed;
-pub mod scene;
-pub mod assemble;
-pub mod pack;
-mod propagate;
-pub mod opening_responses;
 pub mod light;
-pub mod visibility;
-pub mod beam;
-pub mod direct;
-pub mod probes;
+pub mod output;
+pub mod modular;
 pub mod executor;
-pub mod frame;
-pub mod atlas;

@@ -5,14 +5,14 @@ use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, FrameConfig, Outputs};
-use mrt_runtime::level::Door;
-use mrt_runtime::light::Light;
-use mrt_runtime::maze::maze;
-use mrt_runtime::probes::ProbeOrder;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Door;
+use mrt_runtime::level::maze::maze;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, Outputs};
+use mrt_runtime::output::probes::ProbeOrder;
 
 /// Share of the brightest texel by which levels may differ: sums of some hundred products in another order, in `f32`.
 const ROUNDING: f32 = 1e-5;

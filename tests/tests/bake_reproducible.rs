@@ -4,8 +4,8 @@ mod common;
 
 use common::DEFAULT_BYTES;
 use mrt_core::storage::Storage;
-use mrt_dictionary::bake::bake;
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::{Cancelled, Progress};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 

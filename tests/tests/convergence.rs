@@ -6,11 +6,11 @@ use common::{
     Random, assembled, by_texel, closed_floor_plans, floor_plan, random_cells, solved, sphere,
 };
 use glam::Vec3;
-use mrt_runtime::frame::{Bounces, Frame, MAX_PASSES};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::frame::{Bounces, Frame, MAX_PASSES};
+use mrt_runtime::modular::scene::Scene;
 
 /// Sums over texels; blocks are unit cubes, so all texels have the same area.
 fn flux(scene: &Scene, signal: &[f32], channel: usize) -> f64 {

@@ -4,24 +4,26 @@ mod common;
 
 use common::{CONVERGED, default_dictionary, solved, sphere};
 use glam::Vec3;
-use mrt_core::matrix::{Matrix, multiply};
-use mrt_core::radiometry::sphere_light_irradiance;
-use mrt_dictionary::bake::bake;
-use mrt_dictionary::bounce::{Reconstruction, closed_cube_bounce};
+use mrt_core::lighting::sphere_light::sphere_light_irradiance;
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
+use mrt_core::reference::oracle_file::{
+    Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read,
+};
 use mrt_dictionary::config::{BakeConfig, PriorConfig};
-use mrt_dictionary::prior::{direct_samples, light_prior};
+use mrt_dictionary::modular::bake::bake;
+use mrt_dictionary::modular::light_prior::cube::{direct_samples, light_prior};
+use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
+use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
-use mrt_dictionary::symmetry::texel_parity_classes;
-use mrt_dictionary::transport::{block_transport, fold_bounce};
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces as Passes, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::shape::Shape;
-use mrt_tests::Bounces;
-use mrt_tests::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
-use mrt_tests::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::shape::Shape;
+use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces as Passes, Frame};
+use mrt_runtime::modular::scene::Scene;
 use std::path::Path;
 use std::sync::OnceLock;
 

@@ -8,11 +8,11 @@ use common::{
 };
 use glam::Vec3;
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::frame::{Bounces, Frame, FrameError};
-use mrt_runtime::level::{Door, Level};
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::{Door, Level};
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameError};
+use mrt_runtime::modular::scene::Scene;
 
 /// Light behind doors is summed apart from the rest, so sums of products in `f32` come in another order.
 /// Measured: 6e-7 of the brightest texel over ten bounces.
@@ -46,7 +46,7 @@ fn with_door(mut level: Level, connection: usize, value: f32) -> Level {
     level
 }
 
-fn lamp(position: Vec3) -> mrt_runtime::light::Light {
+fn lamp(position: Vec3) -> mrt_runtime::light::placed::Light {
     sphere(position, 0.1, Vec3::new(1.0, 2.0, 3.0))
 }
 

@@ -7,11 +7,11 @@ use common::{
     largest_difference, solved,
 };
 use glam::Vec3;
-use mrt_core::cube::Face;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_tests::error_measure::rel_l2;
-use mrt_tests::exact::transport::Transport;
+use mrt_core::geometry::cube::Face;
+use mrt_core::reference::error_measure::rel_l2;
+use mrt_core::reference::radiosity::transport::Transport;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::modular::frame::{Bounces, Frame};
 
 /// Two products in `f32` in place of one, over many bounces.
 const ROUNDING: f64 = 1e-5;

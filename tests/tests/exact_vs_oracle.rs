@@ -7,13 +7,15 @@
 //! texels, a quarter of the noise, where an error of the solver would stay as large as it is.
 
 use glam::DVec3;
-use mrt_tests::Bounces;
-use mrt_tests::error_measure::{rel_l2, rel_l2_by_hop};
-use mrt_tests::exact::ExactScene;
-use mrt_tests::exact::direct::{PointLight, direct, direct_quarters};
-use mrt_tests::exact::solve::{solve, solve_rgb};
-use mrt_tests::exact::transport::Transport;
-use mrt_tests::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read};
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
+use mrt_core::reference::oracle_file::{
+    Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read,
+};
+use mrt_core::reference::radiosity::ExactScene;
+use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
+use mrt_core::reference::radiosity::solve::{solve, solve_rgb};
+use mrt_core::reference::radiosity::transport::Transport;
 
 /// Whole level, mean over lights: found 0.12 to 0.26 %, of it 0.1 the file's noise.
 const FIRST_BOUNCE_LIMIT: f64 = 0.003;

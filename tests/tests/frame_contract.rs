@@ -5,12 +5,12 @@ mod common;
 use allocation_counter::measure;
 use common::{assembled, by_texel, floor_plan, solved, sphere};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::Face;
-use mrt_runtime::frame::{Bounces, Frame, FrameError, MAX_LIGHTS};
-use mrt_runtime::level::{Door, Level};
-use mrt_runtime::light::{Light, LightError};
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::{Openings, Rays};
+use mrt_core::geometry::cube::Face;
+use mrt_runtime::level::block::{Door, Level};
+use mrt_runtime::light::placed::{Light, LightError};
+use mrt_runtime::light::visibility::{Openings, Rays};
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, MAX_LIGHTS};
+use mrt_runtime::modular::scene::Scene;
 
 const CELLS: [[i32; 2]; 4] = [[0, 0], [1, 0], [2, 0], [1, 1]];
 

@@ -8,15 +8,15 @@ use common::{Random, by_texel, default_dictionary, largest_difference};
 use glam::Vec3;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, FrameConfig, Outputs};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::maze::maze;
-use mrt_runtime::probes::ProbeOrder;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::maze::maze;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, Outputs};
+use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::output::probes::ProbeOrder;
 use sequences::{
     STORAGES, mobile_dictionary, outputs, random_level, random_lights, stored, vector_dictionary,
 };

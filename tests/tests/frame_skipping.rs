@@ -7,13 +7,13 @@ mod sequences;
 use allocation_counter::measure;
 use common::{Random, assembled, default_dictionary, floor_plan, sphere};
 use glam::{DVec3, Vec3};
-use mrt_runtime::frame::{Bounces, Frame, FrameConfig, FrameError, Outputs};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::maze::maze;
-use mrt_runtime::probes::ProbeOrder;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::{Openings, Rays, Versioned};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::maze::maze;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::{Openings, Rays, Versioned};
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, FrameError, Outputs};
+use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::output::probes::ProbeOrder;
 use sequences::{
     STORAGES, difference, furnish, mobile, mobile_dictionary, random_albedo, random_level,
     random_lights, stored, vector_dictionary,
@@ -299,7 +299,7 @@ fn without_bounces_probes_are_dark() {
 #[test]
 fn doors_move_for_versioned_openings_too() {
     let mut level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-    level.doors.push(mrt_runtime::level::Door {
+    level.doors.push(mrt_runtime::level::block::Door {
         connection: 0,
         value: 1.0,
     });

@@ -7,12 +7,12 @@ mod sequences;
 use allocation_counter::measure;
 use common::{Random, by_texel, sphere};
 use glam::{DVec3, Vec3};
-use mrt_runtime::frame::{Bounces, Frame, FrameConfig, FrameWork};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::maze::maze;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::maze::maze;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, FrameWork};
+use mrt_runtime::modular::scene::Scene;
 use sequences::{
     difference, furnish, mobile, random_intensity, random_level, random_lights, shown,
 };
@@ -62,7 +62,7 @@ fn unkind_lights(random: &mut Random, level: &Level, scene: &Scene) -> Vec<Light
         lights.push(sphere(near, 0.0, random_intensity(random)));
     }
     // A wall's texel may lie outside by rounding.
-    lights.retain(|light| mrt_runtime::light::place(scene, 0, *light).is_ok());
+    lights.retain(|light| mrt_runtime::light::placed::place(scene, 0, *light).is_ok());
     lights
 }
 

@@ -4,15 +4,15 @@
 mod warped;
 
 use glam::DVec3;
-use mrt_core::cube::Face;
-use mrt_core::matrix::{Matrix, multiply};
-use mrt_dictionary::warped_prior::warped_direct_samples;
-use mrt_runtime::shape::SHAPES;
-use mrt_tests::Bounces;
-use mrt_tests::exact::direct::{PointLight, direct_quarters};
-use mrt_tests::exact::solve::solve;
-use mrt_tests::exact::transport::Transport;
-use mrt_tests::exact::{ExactScene, Side};
+use mrt_core::geometry::cube::Face;
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
+use mrt_core::reference::radiosity::solve::solve;
+use mrt_core::reference::radiosity::transport::Transport;
+use mrt_core::reference::radiosity::{ExactScene, Side};
+use mrt_dictionary::modular::light_prior::warped::warped_direct_samples;
+use mrt_runtime::level::shape::SHAPES;
 use warped::*;
 
 const LENGTH: f64 = 4.0;

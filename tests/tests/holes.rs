@@ -5,19 +5,19 @@ mod common;
 
 use common::{by_texel, solved, sphere};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::form_factor::point_to_polygon;
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::radiometry::sphere_light_irradiance;
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::form_factor::point_to_polygon;
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::lighting::sphere_light::sphere_light_irradiance;
+use mrt_core::reference::error_measure::rel_l2;
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::Bounces;
-use mrt_runtime::level::{Block, Connection, Level, Opening};
-use mrt_runtime::shape::{Hole, Shape};
-use mrt_tests::error_measure::rel_l2;
+use mrt_runtime::level::block::{Block, Connection, Level, Opening};
+use mrt_runtime::level::shape::{Hole, Shape};
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::Bounces;
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
@@ -145,7 +145,7 @@ fn truth(hole: Hole, pieces: &[Piece], block: usize, point: DVec3, normal: DVec3
 }
 
 /// Light that falls through the hole on other walls directly; the truth has the lit room's only.
-fn only_first_block(scene: &mrt_runtime::scene::Scene, direct: &[f32]) -> Vec<f32> {
+fn only_first_block(scene: &mrt_runtime::modular::scene::Scene, direct: &[f32]) -> Vec<f32> {
     let mut direct = direct.to_vec();
     direct[3 * scene.blocks[0].texels.end..].fill(0.0);
     direct

@@ -5,9 +5,9 @@ mod common;
 use common::{Random, floor_plan};
 use mrt_core::container::{ByteBudget, Container, ElementType, Format, Writer};
 use mrt_core::storage::{Storage, f16};
-use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::dictionary::{Dictionary, StoredDictionary, Variant, WarpTransport};
-use mrt_runtime::dictionary_file::DictionaryError;
+use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
+use mrt_runtime::modular::dictionary::{Dictionary, StoredDictionary, Variant, WarpTransport};
+use mrt_runtime::modular::dictionary_file::DictionaryError;
 
 const BYTE_BUDGET: u64 = 64 << 20;
 

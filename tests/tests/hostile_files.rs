@@ -4,18 +4,18 @@ mod common;
 
 use common::{DEFAULT_BYTES, Random, default_dictionary, floor_plan};
 use mrt_core::container::{ByteBudget, ContainerError, Format, Writer};
-use mrt_core::matrix::Matrix;
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::dictionary::{
+use mrt_core::linalg::matrix::Matrix;
+use mrt_runtime::level::shape::{Hole, SHAPES};
+use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::modular::dictionary::{
     Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
     Sources, StoredDictionary,
 };
-use mrt_runtime::dictionary_file::{
+use mrt_runtime::modular::dictionary_file::{
     DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES,
     MAX_RESOLUTION, MAX_VARIANTS,
 };
-use mrt_runtime::path::{MAX_WORD, Word};
-use mrt_runtime::shape::{Hole, SHAPES};
+use mrt_runtime::modular::path::{MAX_WORD, Word};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
     Dictionary::from_bytes(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))

@@ -4,11 +4,11 @@ mod common;
 
 use common::{default_dictionary, floor_plan};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::HexahedronError;
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::level::{Connection, Level, LevelError, Opening};
-use mrt_runtime::level_text::{LevelTextError, from_text, to_text};
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::hexahedron::HexahedronError;
+use mrt_runtime::level::block::{Connection, Level, LevelError, Opening};
+use mrt_runtime::level::text::{LevelTextError, from_text, to_text};
+use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 

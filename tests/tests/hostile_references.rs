@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use mrt_core::cube::Face;
-use mrt_tests::Bounces;
-use mrt_tests::oracle_file::{Kind, ReferenceError, read};
+use mrt_core::geometry::cube::Face;
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::oracle_file::{Kind, ReferenceError, read};
 use serde_json::{Value, json};
 
 /// Two cells, two bounces of 2 x 2 texels on ten walls, for one light.

@@ -7,13 +7,13 @@ use common::{
     solved, sphere,
 };
 use glam::{DMat3, DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::Hexahedron;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::frame::Bounces;
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::scene::Scene;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::frame::Bounces;
+use mrt_runtime::modular::scene::Scene;
 use std::collections::HashMap;
 
 /// Sums of some thousand products in `f32`, in another order or of other last bits; over ten bounces.

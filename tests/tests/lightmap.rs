@@ -4,11 +4,11 @@ mod common;
 
 use common::{assembled, floor_plan, solved, sphere};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::scene::{Beyond, Scene};
-use mrt_runtime::visibility::Openings;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::scene::{Beyond, Scene};
 
 /// A loop, a junction and a room of 2x2: blocks of several orientations are joined, around pillars and not.
 const CELLS: [[i32; 2]; 12] = [
@@ -39,7 +39,7 @@ fn lit() -> (Level, Scene, Frame) {
 }
 
 fn walls(scene: &Scene) -> Vec<(usize, Face)> {
-    let of = |(index, block): (usize, &mrt_runtime::scene::SceneBlock)| {
+    let of = |(index, block): (usize, &mrt_runtime::modular::scene::SceneBlock)| {
         block
             .shape
             .walls()

@@ -6,12 +6,12 @@ use common::{CONVERGED, floor_plan, largest_difference, solved, sphere};
 use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::dictionary::{Dictionary, StoredDictionary};
-use mrt_runtime::dictionary_file::DICTIONARY_VERSION;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
+use mrt_runtime::modular::dictionary::{Dictionary, StoredDictionary};
+use mrt_runtime::modular::dictionary_file::DICTIONARY_VERSION;
+use mrt_runtime::modular::frame::{Bounces, Frame};
 
 const BYTE_BUDGET: u64 = 16 << 20;
 

@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 use mrt_core::container::ByteBudget;
-use mrt_core::matrix::{MatrixView, multiply, multiply_add};
+use mrt_core::linalg::matrix::{MatrixView, multiply, multiply_add};
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::light::Light;
-use mrt_runtime::maze::maze;
-use mrt_runtime::opening_responses::responses_by_opening;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::maze::maze;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::opening_responses::responses_by_opening;
 
 #[test]
 fn responses_by_opening_add_up_to_the_transport_of_the_scene() {

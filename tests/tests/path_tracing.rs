@@ -1,15 +1,15 @@
 //! The path tracer against closed forms and against the exact solver.
 
 use glam::{DVec3, Vec3};
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::mesh::{Material, TriangleMesh};
-use mrt_tests::Bounces;
-use mrt_tests::error_measure::rel_l2;
-use mrt_tests::exact::ExactScene;
-use mrt_tests::exact::direct::{PointLight, direct, direct_quarters};
-use mrt_tests::exact::solve::solve;
-use mrt_tests::exact::transport::Transport;
-use mrt_tests::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::mesh::{Material, TriangleMesh};
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::error_measure::rel_l2;
+use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
+use mrt_core::reference::radiosity::ExactScene;
+use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
+use mrt_core::reference::radiosity::solve::solve;
+use mrt_core::reference::radiosity::transport::Transport;
 
 fn unit_cube(albedo: f32) -> TriangleMesh {
     let positions = (0..8)

@@ -4,19 +4,21 @@ mod common;
 
 use common::{Random, exact_of, floor_plan, in_level_order, largest_difference};
 use glam::DVec3;
-use mrt_core::cube::Face;
-use mrt_core::cube_symmetry::CubeSymmetry;
-use mrt_core::matrix::Matrix;
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::reference::radiosity::transport::Transport;
 use mrt_dictionary::config::BakeConfig;
-use mrt_dictionary::path_transport::{EMITTER, Gather, RECEIVER, Signals, gather, texel_at};
+use mrt_dictionary::modular::bake::bake;
+use mrt_dictionary::modular::paths::transport::{
+    EMITTER, Gather, RECEIVER, Signals, gather, texel_at,
+};
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::path::{Crossing, Word, response_frame};
-use mrt_runtime::shape::Hole;
-use mrt_tests::exact::transport::Transport;
+use mrt_runtime::level::shape::Hole;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::path::{Crossing, Word, response_frame};
 use std::sync::OnceLock;
 
 const RESOLUTION: usize = 3;
@@ -108,8 +110,8 @@ const FULL_RANK: f64 = 1e-4;
 
 /// One bounce of direct light given in the order of the level.
 fn first_bounce(
-    level: &mrt_runtime::level::Level,
-    scene: &mrt_runtime::scene::Scene,
+    level: &mrt_runtime::level::block::Level,
+    scene: &mrt_runtime::modular::scene::Scene,
     light: &[[f32; 3]],
 ) -> Vec<[f32; 3]> {
     let mut direct = vec![0.0; 3 * scene.texel_count()];

@@ -3,14 +3,14 @@
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
-use mrt_core::cube::Face;
-use mrt_core::hexahedron::Hexahedron;
-use mrt_tests::Bounces;
-use mrt_tests::error_measure::rel_l2;
-use mrt_tests::exact::direct::{PointLight, direct, direct_mean, direct_quarters};
-use mrt_tests::exact::solve::solve;
-use mrt_tests::exact::transport::Transport;
-use mrt_tests::exact::{ExactError, ExactScene, Side};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::error_measure::rel_l2;
+use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_mean, direct_quarters};
+use mrt_core::reference::radiosity::solve::solve;
+use mrt_core::reference::radiosity::transport::Transport;
+use mrt_core::reference::radiosity::{ExactError, ExactScene, Side};
 
 /// Form factors are stored as `f32`; a row of a thousand adds up to within this of 1.
 const ROW_SUM_TOLERANCE: f64 = 1e-6;

@@ -1,19 +1,19 @@
 //! Probes: the same light as on the walls, in world axes, continuous from block to block.
 
 use glam::{DVec3, Vec3, vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::sh;
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::lighting::sh;
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, Outputs};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::probes::{ProbeOrder, irradiance_from_probe};
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame, Outputs};
+use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::output::probes::{ProbeOrder, irradiance_from_probe};
 use std::sync::OnceLock;
 
 fn dictionary() -> &'static Dictionary {

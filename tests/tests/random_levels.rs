@@ -4,9 +4,9 @@ mod common;
 
 use common::{Random, assembled, by_texel, solved, sphere, texel_areas};
 use glam::Vec3;
-use mrt_runtime::frame::Bounces;
-use mrt_runtime::level::{Door, Level};
-use mrt_runtime::light::Light;
+use mrt_runtime::level::block::{Door, Level};
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::modular::frame::Bounces;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 

@@ -7,17 +7,19 @@ use common::{
     floor_plan, in_level_order, largest_difference, solved, sphere,
 };
 use glam::Vec3;
-use mrt_core::matrix::{Matrix, multiply, transpose_multiply};
-use mrt_dictionary::bounce::{Reconstruction, closed_cube_bounce, restrict_to_shape};
-use mrt_dictionary::prior::ScaledBasis;
+use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
+use mrt_dictionary::modular::light_prior::cube::ScaledBasis;
+use mrt_dictionary::modular::one_bounce::cube::{
+    Reconstruction, closed_cube_bounce, restrict_to_shape,
+};
+use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
-use mrt_dictionary::symmetry::texel_parity_classes;
-use mrt_dictionary::transport::{block_transport, fold_bounce};
-use mrt_runtime::dictionary::ShapeOperators;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::shape::cubes;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::shape::cubes;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::dictionary::ShapeOperators;
+use mrt_runtime::modular::frame::{Bounces, Frame};
 
 /// Largest and mean deviation from 1.
 fn deviation_from_one(irradiance: &[f32]) -> (f64, f64) {

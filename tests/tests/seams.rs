@@ -11,12 +11,12 @@ use common::{
     random_cells, solved, sphere,
 };
 use glam::{DVec3, Vec3};
-use mrt_core::cube::Face;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::scene::{Beyond, Scene};
-use mrt_tests::exact::transport::Transport;
-use mrt_tests::oracle_file::{oracle_folder_or_report, read};
+use mrt_core::geometry::cube::Face;
+use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
+use mrt_core::reference::radiosity::transport::Transport;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::scene::{Beyond, Scene};
 
 /// Largest step of uniform light, as a fraction of it.
 const LARGEST_STEP: f64 = 0.03;

@@ -6,16 +6,16 @@ use common::{DEFAULT_BYTES, corridor, floor_plan, sphere};
 use glam::{DVec3, Vec3, dvec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::dictionary::{
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::text;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
+use mrt_runtime::modular::dictionary::{
     Dictionary, OperatorMatrix, StoredDictionary, Variant, WarpTransport,
 };
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::level_text;
-use mrt_runtime::light::Light;
-use mrt_runtime::pack::{PackConfig, pack};
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::pack::{PackConfig, pack};
 
 const BYTE_BUDGET: u64 = 64 << 20;
 
@@ -45,8 +45,8 @@ fn standard() -> Dictionary {
 }
 
 fn maze() -> Level {
-    let text = include_str!("../../assets/maze.level.toml");
-    level_text::from_text(text).expect("the maze is sound")
+    let level = include_str!("../../assets/maze.level.toml");
+    text::from_text(level).expect("the maze is sound")
 }
 
 fn levels() -> Vec<(&'static str, Level)> {

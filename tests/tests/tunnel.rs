@@ -1,21 +1,21 @@
 //! Tunnels of round tubes against a path tracer on a fine mesh of the same tunnel, and against physics.
 
 use glam::{DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::mesh::{Material, TriangleMesh};
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::mesh::{Material, TriangleMesh};
+use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::{Block, Connection, Level, Opening};
-use mrt_runtime::light::{Light, LightError};
-use mrt_runtime::scene::Scene;
-use mrt_runtime::shape::{Shape, shape_set};
-use mrt_runtime::visibility::Openings;
-use mrt_tests::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
+use mrt_runtime::level::block::{Block, Connection, Level, Opening};
+use mrt_runtime::level::shape::{Shape, shape_set};
+use mrt_runtime::light::placed::{Light, LightError};
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::scene::Scene;
 use std::sync::OnceLock;
 
 const ALBEDO: f32 = 0.6;
@@ -95,7 +95,8 @@ fn placed(shapes: &[&'static Shape], open: [Face; 2]) -> (&'static Shape, CubeRo
         .chain(CubeRotation::all())
         .find_map(|rotation| {
             shapes.iter().find_map(|&shape| {
-                let fits = |o: &mrt_runtime::shape::Aperture| open.contains(&rotation.face(o.face));
+                let fits =
+                    |o: &mrt_runtime::level::shape::Aperture| open.contains(&rotation.face(o.face));
                 shape.openings.iter().all(fits).then_some((shape, rotation))
             })
         })

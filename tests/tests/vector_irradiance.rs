@@ -2,18 +2,18 @@
 //! wall's (the paper's section 6.4 and appendix B).
 
 use glam::{DVec3, Vec3, vec3};
-use mrt_core::cube::Face;
-use mrt_core::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::{Bounces, Frame, Outputs};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::{Bounces, Frame, Outputs};
+use mrt_runtime::modular::scene::Scene;
 use std::sync::OnceLock;
 
 const RESOLUTION: usize = 8;
@@ -122,7 +122,7 @@ fn errors(position: Vec3, tilt: std::ops::Range<usize>) -> f64 {
 }
 
 /// Four coefficients that are linear in the light cannot do better: of all such, those that are fitted to each
-/// lighting anew err as much (`mrt_core::ohlsh`). What is left is the shape of light that one bright wall gives.
+/// lighting anew err as much (`mrt_core::lighting::hemisphere_sh`). What is left is the shape of light that one bright wall gives.
 /// Measured: 1.1, 2.8 and 4.7 % for lights in the middle, off it, and near a corner.
 const MEAN_BOUND: f64 = 0.03;
 const WORST_BOUND: f64 = 0.055;

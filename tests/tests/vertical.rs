@@ -4,17 +4,17 @@ mod common;
 
 use common::{Random, by_texel, largest_difference, solved, sphere};
 use glam::{DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
+use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::Bounces;
-use mrt_runtime::level::Level;
-use mrt_runtime::scene::Scene;
-use mrt_tests::error_measure::{rel_l2, rel_l2_by_hop};
-use mrt_tests::oracle_file::{oracle_folder_or_report, read};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::Bounces;
+use mrt_runtime::modular::scene::Scene;
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -170,7 +170,7 @@ fn a_stack_is_within_the_bounds_of_the_standard_preset() {
             .map(|e| f64::from(e[0]))
             .collect();
         let theirs = reference
-            .indirect_irradiance(light, mrt_tests::Bounces::First, 1.0)
+            .indirect_irradiance(light, mrt_core::reference::bounces::Bounces::First, 1.0)
             .expect("the file has the term");
         let hops = reference.hops(light).expect("the light is in the file");
         let by_hop = rel_l2_by_hop(&ours, &theirs, &hops);

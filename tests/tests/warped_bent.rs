@@ -3,13 +3,13 @@
 mod warped;
 
 use glam::{DVec3, Vec3};
-use mrt_core::cube::Face;
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::matrix::{Matrix, multiply};
-use mrt_core::mesh::{Material, TriangleMesh};
-use mrt_dictionary::warped_bounce::{WarpedWalls, warped_bounce};
-use mrt_tests::error_measure::rel_l2;
-use mrt_tests::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::mesh::{Material, TriangleMesh};
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use mrt_core::reference::error_measure::rel_l2;
+use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
+use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
 use warped::*;
 
 /// Squares along each side of a face: flat triangles that miss a bent face by 1e-4 of its bend.

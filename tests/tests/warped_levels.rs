@@ -5,24 +5,24 @@ mod common;
 
 use common::in_level_order;
 use glam::{DMat3, DVec3, Vec3};
-use mrt_core::cube::{CubeRotation, Face};
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::matrix::Matrix;
-use mrt_core::sh::{rotate, rotation_matrices};
-use mrt_dictionary::bake::bake;
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::lighting::sh::{rotate, rotation_matrices};
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
+use mrt_core::reference::radiosity::solve::solve;
+use mrt_core::reference::radiosity::transport::{Transport, mean_of_quarters};
+use mrt_core::reference::radiosity::{ExactScene, Side};
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
+use mrt_dictionary::modular::variants::advice::{Thresholds, estimate_blocks};
+use mrt_dictionary::modular::variants::build::{VariantConfig, VariantError, make_variants};
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_dictionary::variants::{VariantConfig, VariantError, make_variants};
-use mrt_dictionary::warp_advice::{Thresholds, estimate_blocks};
-use mrt_runtime::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::dictionary::{Dictionary, WarpTransport};
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::{Block, Connection, Level, Opening};
-use mrt_runtime::shape::Shape;
-use mrt_tests::exact::direct::{PointLight, direct_quarters};
-use mrt_tests::exact::solve::solve;
-use mrt_tests::exact::transport::{Transport, mean_of_quarters};
-use mrt_tests::exact::{ExactScene, Side};
+use mrt_runtime::level::block::{Block, Connection, Level, Opening};
+use mrt_runtime::level::shape::Shape;
+use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::modular::dictionary::{Dictionary, WarpTransport};
+use mrt_runtime::modular::frame::{Bounces, Frame};
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
 
@@ -167,7 +167,7 @@ impl Exact {
         let quarters = direct_quarters(&self.scene, &light, 4);
         let direct = quarters.iter().map(mean_of_quarters).collect();
         let albedo = vec![f64::from(ALBEDO); self.scene.texel_count()];
-        let bounces = mrt_tests::Bounces::Count(BOUNCES);
+        let bounces = mrt_core::reference::bounces::Bounces::Count(BOUNCES);
         let indirect = solve(&self.scene, &self.transport, &quarters, bounces, &albedo);
         (direct, indirect.expect("sizes fit"))
     }

@@ -6,11 +6,13 @@
 
 mod warped;
 
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::matrix::{Matrix, multiply};
-use mrt_dictionary::warp_error::{CanonicalOperators, guessed_error, warp_error};
-use mrt_dictionary::warped_prior::warped_direct_samples;
-use mrt_runtime::shape::{SHAPES, Shape};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use mrt_dictionary::modular::light_prior::warped::warped_direct_samples;
+use mrt_dictionary::modular::variants::warp_error::{
+    CanonicalOperators, guessed_error, warp_error,
+};
+use mrt_runtime::level::shape::{SHAPES, Shape};
 use warped::*;
 
 const LIGHTS: u32 = 40;

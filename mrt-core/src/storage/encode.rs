@@ -1,7 +1,7 @@
 //! Choice of scales, and rounding.
 
 use super::{CowValues, ModeAxis, Storage, StoredMatrix, f16};
-use crate::matrix::Matrix;
+use crate::linalg::matrix::Matrix;
 use std::borrow::Cow;
 
 /// The largest `f16` value of a mode is in 2^14 ..= 2^15: as far as possible above the subnormal numbers,

@@ -123,13 +123,13 @@ fn products_err_as_stated() {
     let basis = smooth_columns();
     let coefficients = gaussian_columns().columns_view(0..1).column(0)[..MODES].to_vec();
     let coefficients = Matrix::from_column_major(MODES, 1, coefficients);
-    let exact = crate::matrix::multiply(basis.view(), coefficients.view());
+    let exact = crate::linalg::matrix::multiply(basis.view(), coefficients.view());
     for (storage, tolerance) in [
         (Storage::F16, F16_TOLERANCE),
         (Storage::Int8, INT8_TOLERANCE),
     ] {
         let stored = StoredMatrix::encode(&basis, storage, ModeAxis::Columns).to_matrix();
-        let product = crate::matrix::multiply(stored.view(), coefficients.view());
+        let product = crate::linalg::matrix::multiply(stored.view(), coefficients.view());
         let error = relative_l2(product.data(), exact.data());
         assert!(error <= tolerance, "{}: {error:e}", storage.name());
     }

@@ -2,9 +2,9 @@
 //! the block sees.
 
 use glam::DVec3;
-use mrt_core::bvh::Bvh;
-use mrt_core::cube::Face;
-use mrt_core::hexahedron::Hexahedron;
+use mrt_core::geometry::bvh::Bvh;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Pixels along an edge of each face's picture.
 const RESOLUTION: usize = 64;

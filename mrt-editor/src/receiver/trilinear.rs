@@ -1,7 +1,7 @@
 //! A hexahedron's map in monomials, for millions of inverse lookups.
 
 use glam::{DMat3, DVec3};
-use mrt_core::hexahedron::Hexahedron;
+use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Steps of Newton's method before a point counts as out of reach.
 const MOST_STEPS: usize = 16;
@@ -113,9 +113,11 @@ mod tests {
             assert!(back.distance(unit) < 1e-5);
             let [x, ..] = map.gradients(unit).expect("regular");
             assert!(
-                x.normalize()
-                    .dot(warp.face_normal(mrt_core::cube::Face::NegX, unit.z, unit.y))
-                    > 0.9
+                x.normalize().dot(warp.face_normal(
+                    mrt_core::geometry::cube::Face::NegX,
+                    unit.z,
+                    unit.y
+                )) > 0.9
             );
         }
     }

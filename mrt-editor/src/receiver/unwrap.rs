@@ -2,7 +2,7 @@
 
 use super::{Receiver, ReceiverMap};
 use glam::Vec3;
-use mrt_core::mesh::{TriangleMesh, face_normals};
+use mrt_core::geometry::mesh::{TriangleMesh, face_normals};
 
 /// Triangles that reach into several blocks are halved until they do not, at most this often.
 const MOST_HALVINGS: u32 = 12;

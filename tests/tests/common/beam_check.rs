@@ -2,11 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::simd::SimdLevel;
-use mrt_runtime::beam::{Beam, BeamTracer};
-use mrt_runtime::direct::{TexelPlanes, add_beam, add_exact, irradiance};
-use mrt_runtime::light::{Light, PlacedLight, WALL_TOLERANCE, place};
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::{Openings, Receiver, Toward, Visibility};
+use mrt_runtime::light::beam::{Beam, BeamTracer};
+use mrt_runtime::light::direct_light::{TexelPlanes, add_beam, add_exact, irradiance};
+use mrt_runtime::light::placed::{Light, PlacedLight, WALL_TOLERANCE, place};
+use mrt_runtime::light::visibility::{Openings, Receiver, Toward, Visibility};
+use mrt_runtime::modular::scene::Scene;
 
 /// Share of its own irradiance that a texel may differ by.
 const RELATIVE: f32 = 1e-5;

@@ -5,16 +5,16 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
-use mrt_core::cube::Face;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::dictionary_file::DEFAULT_BYTE_BUDGET;
-use mrt_runtime::frame::{Bounces, Frame};
-use mrt_runtime::level::Level;
-use mrt_runtime::light::Light;
-use mrt_runtime::scene::Scene;
-use mrt_runtime::visibility::Openings;
-use mrt_tests::exact::{ExactScene, Side};
+use mrt_core::geometry::cube::Face;
+use mrt_core::reference::radiosity::{ExactScene, Side};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::light::visibility::Openings;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
+use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::modular::scene::Scene;
 use std::sync::OnceLock;
 
 /// The committed default dictionary.

@@ -7,15 +7,15 @@ use crate::common::{Random, random_cells};
 use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_dictionary::bake::bake;
 use mrt_dictionary::config::BakeConfig;
+use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::assemble::{AssembleConfig, assemble};
-use mrt_runtime::dictionary::Dictionary;
-use mrt_runtime::frame::Frame;
-use mrt_runtime::level::{Door, Level};
-use mrt_runtime::light::Light;
-use mrt_runtime::scene::Scene;
+use mrt_runtime::level::block::{Door, Level};
+use mrt_runtime::light::placed::Light;
+use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::modular::frame::Frame;
+use mrt_runtime::modular::scene::Scene;
 use std::sync::OnceLock;
 
 /// 6² texels a wall, 12 coefficients, probes 2³: whatever does not depend on sizes is tested with it, many times.
@@ -179,7 +179,7 @@ pub fn random_lights(
 ) -> Vec<Light> {
     let lights = (0..count).map(|_| random_light(random, level));
     let lights: Vec<Light> = lights.collect();
-    let fits = |light: &Light| mrt_runtime::light::place(scene, 0, *light).is_ok();
+    let fits = |light: &Light| mrt_runtime::light::placed::place(scene, 0, *light).is_ok();
     lights.into_iter().filter(fits).collect()
 }
 

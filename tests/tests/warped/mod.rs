@@ -4,22 +4,24 @@
 #![allow(dead_code)]
 
 use glam::{DMat3, DQuat, DVec3};
-use mrt_core::cube::Face;
-use mrt_core::hexahedron::Hexahedron;
-use mrt_core::matrix::{Matrix, multiply};
-use mrt_core::sampling::hash;
-use mrt_dictionary::bounce::{Reconstruction, closed_cube_bounce, restrict_to_shape};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::lighting::sampling::hash;
+use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_dictionary::config::{Enrichment, PriorConfig};
-use mrt_dictionary::prior::{direct_samples, enriched_prior, light_prior};
-use mrt_dictionary::progress::Progress;
-use mrt_dictionary::symmetry::texel_parity_classes;
-use mrt_dictionary::transport::{BlockTransport, block_transport, fold_bounce};
-use mrt_dictionary::warped::{RebuildConfig, rebuilt, regathered};
-use mrt_dictionary::warped_bounce::{WarpedWalls, warped_bounce};
-use mrt_dictionary::warped_prior::{
+use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior, light_prior};
+use mrt_dictionary::modular::light_prior::warped::{
     warped_direct_samples, warped_light_radius, warped_prior_lights,
 };
-use mrt_runtime::shape::Shape;
+use mrt_dictionary::modular::one_bounce::cube::{
+    Reconstruction, closed_cube_bounce, restrict_to_shape,
+};
+use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
+use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
+use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
+use mrt_dictionary::progress::Progress;
+use mrt_runtime::level::shape::Shape;
 
 /// Texels along an edge, and modes, of the standard preset.
 pub const RESOLUTION: usize = 16;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::container::{Element, Format};
-use crate::matrix::Matrix;
+use crate::linalg::matrix::Matrix;
 use crate::storage::f16;
 use proptest::prelude::*;
 

@@ -1,0 +1,11 @@
+//! Shapes: the canonical cube and what it is warped to, round tubes, form factors between them, and triangle meshes.
+
+pub mod cube;
+pub mod cube_symmetry;
+pub mod hexahedron;
+pub mod tube;
+pub mod form_factor;
+pub mod polygon_moments;
+pub mod mesh;
+#[cfg(feature = "bvh")]
+pub mod bvh;

@@ -1,0 +1,6 @@
+//! Dense matrices and their decompositions.
+
+pub mod matrix;
+pub mod parity;
+#[cfg(feature = "svd")]
+pub mod svd;

@@ -1,0 +1,6 @@
+//! Lightfields at openings and the operators between them (Loos et al. 2011, section 5.1).
+
+pub mod grid;
+pub mod interface;
+pub mod tube;
+pub mod tube_response;

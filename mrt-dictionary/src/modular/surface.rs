@@ -1,0 +1,4 @@
+//! Mirrors of a shape and of its texels.
+
+pub mod mirrors;
+pub mod warped_mirrors;

@@ -1,0 +1,102 @@
+//! The mirrors that leave a canonical shape as it is, acting on its texels and probes.
+
+use crate::modular::outputs::cube::{DIRECTIONS, probe_points};
+use glam::{DVec3, IVec3};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::parity::ParityClasses;
+use mrt_runtime::level::mirrors::mirrors;
+use mrt_runtime::level::shape::Shape;
+use std::collections::HashMap;
+
+/// Parity classes of the shape's texels: eight for cube, straight and cross, four for most others.
+pub fn texel_parity_classes(shape: &Shape, resolution: usize) -> ParityClasses {
+    output_parity_classes(shape, resolution, 0)
+}
+
+/// Parity classes of the shape's texels followed by the samples of its probes: for each of `probes`³ probes
+/// the values in [`DIRECTIONS`].
+pub fn output_parity_classes(shape: &Shape, resolution: usize, probes: usize) -> ParityClasses {
+    let permutations: Vec<Vec<u32>> = mirrors(shape)
+        .into_iter()
+        .map(|map| output_permutation(shape, resolution, probes, map))
+        .collect();
+    let count = shape.texel_count(resolution) + probes * probes * probes * DIRECTIONS.len();
+    ParityClasses::new(count, &permutations)
+}
+
+/// Where a symmetry of the shape takes its texels and the samples of its probes.
+///
+/// # Panics
+/// If the symmetry does not keep the shape.
+pub fn output_permutation(
+    shape: &Shape,
+    resolution: usize,
+    probes: usize,
+    map: CubeSymmetry,
+) -> Vec<u32> {
+    // Texel and probe centres are odd multiples of half a step: exact as integers.
+    let texel = |face: Face, p: DVec3| (Some(face), scaled(p, resolution), IVec3::ZERO);
+    let probe = |p: DVec3, direction: IVec3| (None, scaled(p, probes), direction);
+    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
+    let samples: Vec<(DVec3, IVec3)> = probe_points(probes)
+        .flat_map(|p| DIRECTIONS.iter().map(move |&d| (p, d)))
+        .collect();
+    let index: HashMap<_, u32> = texels
+        .iter()
+        .map(|&(face, p)| texel(face, p))
+        .chain(samples.iter().map(|&(p, d)| probe(p, d)))
+        .zip(0..)
+        .collect();
+    let texels = texels
+        .iter()
+        .map(|&(face, p)| texel(map.face(face), map.point(p)));
+    let samples = samples.iter().map(|&(p, d)| {
+        let d = map.direction(d.as_dvec3()).as_ivec3();
+        probe(map.point(p), d)
+    });
+    texels.chain(samples).map(|key| index[&key]).collect()
+}
+
+fn scaled(point: DVec3, steps: usize) -> IVec3 {
+    (point * (2 * steps) as f64).round().as_ivec3()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mrt_runtime::level::shape::cubes;
+
+    #[test]
+    fn fold_factors_are_those_of_the_shapes() {
+        let factors: Vec<(&str, usize)> = cubes()
+            .filter(|shape| shape.wall_count() > 0)
+            .map(|shape| (shape.name, texel_parity_classes(shape, 4).class_count()))
+            .collect();
+        let expected = [
+            ("closed", 8),
+            ("dead_end", 4),
+            ("straight", 8),
+            ("corner", 4),
+            ("tee", 4),
+            ("cross", 8),
+            ("corner_up", 2),
+            ("tee_up", 4),
+            ("floor", 4),
+            ("door", 2),
+            ("window", 2),
+            ("doorway", 2),
+            ("window_end", 2),
+        ];
+        assert_eq!(factors, expected);
+    }
+
+    #[test]
+    fn probes_follow_the_mirrors() {
+        for shape in cubes() {
+            let texels = shape.texel_count(4);
+            let classes = output_parity_classes(shape, 4, 2);
+            assert_eq!(classes.point_count(), texels + 8 * DIRECTIONS.len());
+        }
+    }
+}

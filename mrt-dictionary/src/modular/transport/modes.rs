@@ -1,0 +1,151 @@
+//! Reduced direct-to-indirect transfer inside one shape (Loos et al. 2011, section 4.1).
+//!
+//! With `M = F P S = U_m S_m V_mᵀ`: the indirect basis `U_b = U_m S_m`, the implicit lighting
+//! `L_imp = P S V_m` whose indirect light it is (`U_b = F L_imp`), and the operator that gives the
+//! coefficients. For the last we depart from the paper's `V_mᵀ S⁻¹ Pᵀ` and take `S_m⁻¹ U_mᵀ F`: it has
+//! the same size, is the orthogonal projection of the true indirect light on the basis whatever the direct
+//! light, and needs no inverse of S, whose condition reaches 1e11.
+//!
+//! Below F the outputs that a level wants besides are stacked: light at probes, and light on the walls beyond the
+//! openings, so that coefficients are chosen for those too ([`crate::modular::transport::cube`]).
+
+use crate::modular::light_prior::cube::ScaledBasis;
+use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
+use mrt_core::linalg::parity::ParityClasses;
+use mrt_core::linalg::svd::{dropped_energy_beyond_first, svd};
+
+/// Singular values closer than this, relatively, belong to one multiplet of the shape's symmetry, and a
+/// cut never separates them: which vectors of a multiplet come first is a matter of rounding.
+pub const MULTIPLET_TOLERANCE: f64 = 1e-6;
+
+/// The reduced operators of one shape, in texel space.
+#[derive(Clone, Debug)]
+pub struct BlockTransport {
+    /// `U_b`, texels x modes: indirect irradiance of each mode.
+    pub indirect_basis: Matrix<f64>,
+    /// `T_d->b`, modes x texels.
+    pub coefficients_from_direct: Matrix<f64>,
+    /// `L_imp`, texels x modes: radiosity that produces the columns of the basis.
+    pub implicit_lighting: Matrix<f64>,
+    /// All singular values of M, largest first; the first `modes` belong to the columns.
+    pub singular_values: Vec<f64>,
+    /// Fraction that the modes left out hold of M's energy beyond its first mode, which is uniform light.
+    pub dropped_energy: f64,
+}
+
+/// F in the coordinates of each parity class; F respects the mirrors, so nothing is lost.
+pub fn fold_bounce(bounce: &Matrix<f64>, classes: &ParityClasses) -> Vec<Matrix<f64>> {
+    fold_operator(bounce, classes, classes)
+}
+
+/// An operator that respects the mirrors, from signals on one point set to signals on another, in the coordinates
+/// of each parity class.
+pub fn fold_operator(
+    operator: &Matrix<f64>,
+    outputs: &ParityClasses,
+    inputs: &ParityClasses,
+) -> Vec<Matrix<f64>> {
+    (0..inputs.class_count())
+        .map(|class| {
+            let columns: Vec<Vec<f64>> = (0..inputs.dimension(class))
+                .map(|k| {
+                    let mut unit = vec![0.0; inputs.dimension(class)];
+                    unit[k] = 1.0;
+                    let image = multiply_sparse(operator, &inputs.unfold(class, &unit));
+                    outputs.fold(class, &image)
+                })
+                .collect();
+            Matrix::from_columns(outputs.dimension(class), &columns)
+        })
+        .collect()
+}
+
+/// Product with a vector that is zero nearly everywhere.
+pub(crate) fn multiply_sparse(a: &Matrix<f64>, x: &[f64]) -> Vec<f64> {
+    let mut out = vec![0.0; a.rows()];
+    for (j, &weight) in x.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
+        for (o, &value) in out.iter_mut().zip(a.column(j)) {
+            *o += value * weight;
+        }
+    }
+    out
+}
+
+/// Computes the operators from a prior, keeping at most `modes` modes (fewer where a multiplet would be
+/// cut).
+///
+/// `folded_outputs` is everything that radiosity does and that coefficients must be good for, by class: the
+/// bounce itself, and where a level asks for more the light at probes and beyond openings, stacked below it.
+/// Coefficients are then the orthogonal projection of all of them.
+pub fn block_transport(
+    folded_outputs: &[Matrix<f64>],
+    folded_bounce: &[Matrix<f64>],
+    prior: &ScaledBasis,
+    classes: &ParityClasses,
+    modes: usize,
+) -> BlockTransport {
+    let parts: Vec<_> = folded_outputs
+        .iter()
+        .zip(&prior.classes)
+        .map(|(outputs, basis)| svd(multiply(outputs.view(), basis.view()).view()))
+        .collect();
+    let mut order: Vec<(usize, usize)> = (0..parts.len())
+        .flat_map(|class| (0..parts[class].singular_values.len()).map(move |k| (class, k)))
+        .collect();
+    let value = |&(class, k): &(usize, usize)| parts[class].singular_values[k];
+    order.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
+    let singular_values: Vec<f64> = order.iter().map(value).collect();
+    let kept = whole_multiplets(&singular_values, modes);
+
+    let mut indirect_columns = Vec::with_capacity(kept);
+    let mut implicit_columns = Vec::with_capacity(kept);
+    let mut coefficient_rows = Vec::with_capacity(kept);
+    for &(class, k) in &order[..kept] {
+        let part = &parts[class];
+        let sigma = part.singular_values[k];
+        let v = part.v.columns_view(k..k + 1);
+        let implicit = multiply(prior.classes[class].view(), v);
+        implicit_columns.push(classes.unfold(class, implicit.data()));
+        let indirect = multiply(folded_bounce[class].view(), implicit.view());
+        indirect_columns.push(classes.unfold(class, indirect.data()));
+        let row = transpose_multiply(folded_outputs[class].view(), part.u.columns_view(k..k + 1));
+        let row: Vec<f64> = row.data().iter().map(|x| x / sigma).collect();
+        coefficient_rows.push(classes.unfold(class, &row));
+    }
+    let texels = classes.point_count();
+    BlockTransport {
+        indirect_basis: Matrix::from_columns(texels, &indirect_columns),
+        coefficients_from_direct: Matrix::from_columns(texels, &coefficient_rows).transposed(),
+        implicit_lighting: Matrix::from_columns(texels, &implicit_columns),
+        dropped_energy: dropped_energy_beyond_first(&singular_values, kept),
+        singular_values,
+    }
+}
+
+/// The largest count up to `modes` that does not cut through equal singular values, and leaves out
+/// those lost in rounding.
+pub fn whole_multiplets(singular_values: &[f64], modes: usize) -> usize {
+    let largest = singular_values.first().copied().unwrap_or(0.0);
+    let significant = singular_values
+        .iter()
+        .take_while(|&&s| s > 1e-12 * largest)
+        .count();
+    let mut kept = modes.min(significant);
+    if kept < significant {
+        let next = singular_values[kept];
+        while kept > 0 && singular_values[kept - 1] - next <= MULTIPLET_TOLERANCE * next {
+            kept -= 1;
+        }
+        // The first multiplet stays even where it is larger than asked for: no modes are no basis.
+        while kept == 0
+            || singular_values[0] - singular_values[kept]
+                <= MULTIPLET_TOLERANCE * singular_values[0]
+        {
+            kept += 1;
+            if kept == significant {
+                break;
+            }
+        }
+    }
+    kept
+}

@@ -1,0 +1,16 @@
+//! The command line: one module a command, with its flags and what it does, and what commands share.
+
+pub mod output;
+pub mod table;
+pub mod dictionary_source;
+pub mod reference_level;
+pub mod accuracy;
+pub mod adapt;
+pub mod bake;
+pub mod bench;
+pub mod demo;
+pub mod figures;
+pub mod info;
+pub mod light;
+pub mod map;
+pub mod pack;

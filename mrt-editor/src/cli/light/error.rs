@@ -1,0 +1,97 @@
+//! Why `mrt light` stops.
+
+use crate::cli::dictionary_source::SourceError;
+use crate::document::level_file::LevelFileError;
+use crate::import::ImportError;
+use crate::render::file::WriteError;
+use glam::Vec3;
+use mrt_runtime::modular::assemble::AssembleError;
+use mrt_runtime::modular::frame::FrameError;
+use std::path::PathBuf;
+
+/// Why there are no pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum LightCommandError {
+    /// The output would replace the mesh or the level.
+    #[error("--out {}: found the folder of {}; expected a folder of its own", out.display(), input.display())]
+    OutHoldsInput {
+        /// The output folder.
+        out: PathBuf,
+        /// The input in it.
+        input: PathBuf,
+    },
+    /// Mesh and level do not lie in the same place.
+    #[error(
+        "level {}: {:.1} % of the mesh's area lies in or near a block; expected at least {:.0} % (is it this \
+         mesh's level, and are --scale and --up those of `mrt map`?)",
+        path.display(), 100.0 * found, 100.0 * expected
+    )]
+    OtherMesh {
+        /// The level file.
+        path: PathBuf,
+        /// Smallest share accepted.
+        expected: f64,
+        /// Share of the area.
+        found: f64,
+    },
+    /// The mesh cannot be read.
+    #[error(transparent)]
+    Import(#[from] ImportError),
+    /// The level's file is at fault.
+    #[error(transparent)]
+    Level(#[from] LevelFileError),
+    /// There is no dictionary.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// Level and dictionary do not fit.
+    #[error(transparent)]
+    Assemble(#[from] AssembleError),
+    /// A light is refused.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A light is outside every block.
+    #[error(
+        "light {light} at {position} m lies in no block: {distance:.3} m outside block {block}, the \
+         nearest; expected a point inside the level"
+    )]
+    OutsideBlocks {
+        /// Which light.
+        light: usize,
+        /// Its position.
+        position: Vec3,
+        /// The nearest block.
+        block: usize,
+        /// Metres to it.
+        distance: f64,
+    },
+    /// A light is behind the mesh's faces.
+    #[error(
+        "light {light} at {position} m lies inside a wall: it sees the backs of faces in {backs:.0} % \
+         of all directions; expected a point in a room"
+    )]
+    InWall {
+        /// Which light.
+        light: usize,
+        /// Its position.
+        position: Vec3,
+        /// Share of directions, percent.
+        backs: f32,
+    },
+    /// Nowhere to put the default light.
+    #[error(
+        "no light was given and none of the level's blocks has free space at its centre; expected \
+         --light x,y,z,intensity"
+    )]
+    NoPlace,
+    /// The camera has no direction.
+    #[error("--camera {from};{to}: expected two different points")]
+    Camera {
+        /// Where it stands.
+        from: Vec3,
+        /// Where it looks.
+        to: Vec3,
+    },
+    /// The files cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

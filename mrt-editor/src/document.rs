@@ -1,0 +1,3 @@
+//! Levels on disk.
+
+pub mod level_file;

@@ -1,0 +1,67 @@
+//! Reading and writing a level's file.
+
+use mrt_core::container::{ContainerError, write_file_atomically};
+use mrt_runtime::level::block::Level;
+use mrt_runtime::level::text::{LevelTextError, MAX_TEXT_BYTES, from_text, to_text};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Why a level's file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LevelFileError {
+    /// It cannot be read.
+    #[error("level {}: {source}", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It holds no sound level.
+    #[error("level {}: {source}", path.display())]
+    Level {
+        /// Which file.
+        path: PathBuf,
+        /// What is wrong.
+        source: LevelTextError,
+    },
+    /// It cannot be written.
+    #[error(transparent)]
+    Write(#[from] ContainerError),
+}
+
+/// Reads and checks a level.
+///
+/// # Errors
+/// [`LevelFileError::Read`] and [`LevelFileError::Level`].
+pub fn read_level(path: &Path) -> Result<Level, LevelFileError> {
+    let io = |source| LevelFileError::Read {
+        path: path.to_owned(),
+        source,
+    };
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .map_err(io)?
+        // One byte more than a level may have tells too long from just fitting.
+        .take(MAX_TEXT_BYTES as u64 + 1)
+        .read_to_end(&mut bytes)
+        .map_err(io)?;
+    let text = String::from_utf8_lossy(&bytes);
+    from_text(&text).map_err(|source| LevelFileError::Level {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Writes a level, whole or not at all.
+///
+/// # Errors
+/// [`LevelFileError::Level`] and [`LevelFileError::Write`].
+pub fn write_level(path: &Path, level: &Level) -> Result<(), LevelFileError> {
+    let text = to_text(level).map_err(|source| LevelFileError::Level {
+        path: path.to_owned(),
+        source,
+    })?;
+    write_file_atomically(path, text.as_bytes())?;
+    Ok(())
+}

@@ -1,0 +1,89 @@
+//! Gives every wall of a level the mean albedo of the surfaces that receive their light from it.
+
+use super::surface::SurfacePoint;
+use crate::receiver::ReceiverMap;
+use glam::{DVec3, Vec3};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::mesh::TriangleMesh;
+use mrt_runtime::level::block::Level;
+use serde::Serialize;
+
+/// A point is near a block within this share of the block's diagonal: walls of real rooms have niches,
+/// and blocks are coarse.
+const NEAR: f64 = 0.1;
+
+/// Shares of the mesh's area.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Coverage {
+    /// Inside a block.
+    pub inside: f64,
+    /// Inside or near one.
+    pub near: f64,
+}
+
+/// Measures how much of the mesh the level holds.
+pub fn coverage(level: &Level, receivers: &ReceiverMap, points: &[SurfacePoint]) -> Coverage {
+    let (mut inside, mut near, mut total) = (0.0, 0.0, 0.0);
+    for point in points {
+        total += point.area;
+        let distance = distance_in_blocks(level, receivers, point);
+        // Rounding puts a wall's own surface a hair outside.
+        inside += if distance <= 1e-3 { point.area } else { 0.0 };
+        near += if distance <= NEAR { point.area } else { 0.0 };
+    }
+    if total == 0.0 {
+        return Coverage::default();
+    }
+    Coverage {
+        inside: inside / total,
+        near: near / total,
+    }
+}
+
+/// Distance from the nearest block in diagonals of it.
+fn distance_in_blocks(level: &Level, receivers: &ReceiverMap, point: &SurfacePoint) -> f64 {
+    receivers
+        .nearest_block(point.position)
+        .map_or(f64::INFINITY, |(block, distance)| {
+            distance / level.blocks[block].warp.diagonal()
+        })
+}
+
+/// Paints the walls and measures how much of the mesh the level holds.
+pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoint]) -> Coverage {
+    let receivers = ReceiverMap::new(level);
+    let covered = coverage(level, &receivers, points);
+    let mut walls = vec![[(DVec3::ZERO, 0.0); 6]; level.blocks.len()];
+    for point in points {
+        if distance_in_blocks(level, &receivers, point) > NEAR {
+            continue;
+        }
+        if let Some(receiver) = receivers.receiver(point.position, point.normal) {
+            let material = mesh.triangle_materials[point.triangle] as usize;
+            let albedo = mesh.materials[material].albedo.as_dvec3();
+            let (sum, area) = &mut walls[receiver.block][receivers.turned_face(&receiver).index()];
+            *sum += albedo * point.area;
+            *area += point.area;
+        }
+    }
+    let whole = mean(walls.iter().flatten());
+    for (block, walls) in level.blocks.iter_mut().zip(&walls) {
+        let of_block = mean(walls.iter()).or(whole).unwrap_or(Vec3::splat(0.5));
+        for face in Face::ALL {
+            block.albedo[face.index()] = if block.is_open(face) {
+                of_block
+            } else {
+                mean([&walls[face.index()]].into_iter()).unwrap_or(of_block)
+            };
+        }
+    }
+    covered
+}
+
+/// The mean over areas, `None` without any; kept in [0, 1] against rounding.
+fn mean<'a>(sums: impl Iterator<Item = &'a (DVec3, f64)>) -> Option<Vec3> {
+    let (sum, area) = sums.fold((DVec3::ZERO, 0.0), |(sum, area), (s, a)| {
+        (sum + s, area + a)
+    });
+    (area > 0.0).then(|| (sum / area).as_vec3().clamp(Vec3::ZERO, Vec3::ONE))
+}

@@ -1,0 +1,204 @@
+//! What a ray sees of a level's own walls.
+
+use glam::{DVec3, Vec3};
+use mrt_core::geometry::bvh::Bvh;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::mesh::TriangleMesh;
+use mrt_runtime::level::shape::Shape;
+use mrt_runtime::light::direct_light::irradiance;
+use mrt_runtime::light::placed::{Light, LightError, PlacedLight, place};
+use mrt_runtime::light::visibility::{Openings, Receiver};
+use mrt_runtime::modular::frame::Frame;
+use mrt_runtime::modular::scene::Scene;
+use std::f32::consts::PI;
+
+/// Parts along each axis into which a wall is cut: warped walls are bent.
+const WALL_PARTS: usize = 4;
+
+/// The same for a chart of a tube, a quarter of the way around: chords are 2e-4 block widths off their arcs.
+const CHART_PARTS: usize = 24;
+
+/// Distance, in lengths of the ray's direction, by which a ray restarts behind a wall seen from outside.
+const RESTART: f32 = 1e-4;
+
+/// The level's walls as a mesh, one-sided: from outside one looks into the blocks.
+pub struct LevelView<'a> {
+    scene: &'a Scene,
+    frame: &'a Frame,
+    lights: Vec<PlacedLight>,
+    bvh: Bvh,
+    /// (block, canonical face, texture cell, half) of each triangle.
+    triangles: Vec<Patch>,
+}
+
+/// Why there is no view.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ViewError {
+    /// A light is refused.
+    #[error(transparent)]
+    Light(#[from] LightError),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Patch {
+    block: usize,
+    face: Face,
+    /// (u, v) of the triangle's corners on the face.
+    corners: [[f32; 2]; 3],
+}
+
+/// A point of a wall that a ray meets from inside.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    patch: Patch,
+    u: f32,
+    v: f32,
+    normal: DVec3,
+    distance: f32,
+}
+
+impl<'a> LevelView<'a> {
+    /// A view of a solved scene; without ceilings (+y walls as the level names them) it can be seen from
+    /// above.
+    ///
+    /// # Errors
+    /// [`ViewError::Light`].
+    pub fn new(
+        scene: &'a Scene,
+        frame: &'a Frame,
+        lights: &[Light],
+        with_ceilings: bool,
+    ) -> Result<Self, ViewError> {
+        let lights = lights
+            .iter()
+            .enumerate()
+            .map(|(index, &light)| place(scene, index, light))
+            .collect::<Result<_, _>>()?;
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for (index, block) in scene.blocks.iter().enumerate() {
+            for face in block.shape.walls() {
+                if !with_ceilings && block.orientation.face(face) == Face::PosY {
+                    continue;
+                }
+                let parts = match block.shape.tube() {
+                    None => WALL_PARTS,
+                    Some(_) => CHART_PARTS,
+                };
+                for cell in 0..parts * parts {
+                    let at = |k: usize| k as f32 / parts as f32;
+                    let (i, j) = (cell % parts, cell / parts);
+                    let [a, b] = [[at(i), at(j)], [at(i + 1), at(j)]];
+                    let [c, d] = [[at(i + 1), at(j + 1)], [at(i), at(j + 1)]];
+                    for corners in [[a, b, c], [a, c, d]] {
+                        for [u, v] in corners {
+                            let wall = block.shape.wall_point(face, f64::from(u), f64::from(v));
+                            positions.push(block.warp.point(wall.position).as_vec3());
+                        }
+                        triangles.push(Patch {
+                            block: index,
+                            face,
+                            corners,
+                        });
+                    }
+                }
+            }
+        }
+        let indices = (0..triangles.len() as u32)
+            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .collect();
+        let mesh = TriangleMesh::from_triangles(positions, indices);
+        Ok(Self {
+            scene,
+            frame,
+            lights,
+            bvh: Bvh::build(&mesh),
+            triangles,
+        })
+    }
+
+    /// Radiance towards the ray's origin, W/(m² sr) per channel, from direct and from indirect light;
+    /// `None` where the ray meets no wall from inside.
+    pub fn radiance(&self, origin: Vec3, direction: Vec3) -> Option<(Vec3, Vec3)> {
+        let seen = self.seen(origin, direction)?;
+        Some(self.leaving(&seen))
+    }
+
+    /// How far the ray goes until it meets a wall from inside, in lengths of its direction.
+    pub fn distance(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        self.seen(origin, direction).map(|seen| seen.distance)
+    }
+
+    fn seen(&self, mut origin: Vec3, direction: Vec3) -> Option<Seen> {
+        let mut start = 0.0;
+        // A ray crosses each block at most twice.
+        for _ in 0..2 * self.scene.blocks.len() + 2 {
+            let hit = self.bvh.closest_hit(origin, direction, f32::MAX)?;
+            let patch = self.triangles[hit.triangle as usize];
+            let [a, b, c] = patch.corners;
+            let mix = |k: usize| a[k] + hit.u * (b[k] - a[k]) + hit.v * (c[k] - a[k]);
+            let (u, v) = (mix(0), mix(1));
+            let block = &self.scene.blocks[patch.block];
+            let wall = block
+                .shape
+                .wall_point(patch.face, f64::from(u), f64::from(v));
+            let normal = wall.warped_normal(&block.warp);
+            if normal.dot(direction.as_dvec3()) < 0.0 {
+                return Some(Seen {
+                    patch,
+                    u,
+                    v,
+                    normal,
+                    distance: start + hit.t,
+                });
+            }
+            origin += direction * (hit.t + RESTART);
+            start += hit.t + RESTART;
+        }
+        None
+    }
+
+    fn leaving(&self, seen: &Seen) -> (Vec3, Vec3) {
+        let Seen {
+            patch,
+            u,
+            v,
+            normal,
+            ..
+        } = *seen;
+        let block = &self.scene.blocks[patch.block];
+        let (across, up) = (f64::from(u), f64::from(v));
+        let wall = block.shape.wall_point(patch.face, across, up);
+        let receiver = Receiver {
+            block: patch.block,
+            position: block.warp.point(wall.position),
+        };
+        let direct: Vec3 = self
+            .lights
+            .iter()
+            .map(|light| {
+                irradiance(
+                    self.scene,
+                    light,
+                    &self.scene.doors,
+                    receiver,
+                    normal,
+                    &Openings,
+                )
+            })
+            .sum();
+        let atlas = &self.scene.atlas;
+        let indirect = atlas
+            .pixel(patch.block, patch.face, u, v)
+            .map_or(Vec3::ZERO, |pixel| {
+                Vec3::from_array(atlas.sample(self.frame.lightmap(), pixel))
+            });
+        let texel = Shape::texel_of_uv(self.scene.resolution, across, up);
+        let albedo = block
+            .shape
+            .wall_offset(patch.face, self.scene.resolution)
+            .map_or(Vec3::ZERO, |offset| {
+                self.scene.texel_albedo(block.texels.start + offset + texel)
+            });
+        (direct * albedo / PI, indirect * albedo / PI)
+    }
+}

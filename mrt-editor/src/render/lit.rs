@@ -1,0 +1,183 @@
+//! Colours of a mesh under sphere lights, with indirect light from a lightmap.
+
+use crate::receiver::{Blend, ReceiverMap};
+use glam::Vec3;
+use mrt_core::geometry::bvh::Bvh;
+use mrt_core::geometry::mesh::TriangleMesh;
+use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
+use mrt_runtime::output::lightmap_atlas::AtlasLayout;
+use std::f32::consts::PI;
+
+/// Shadow rays to each light that are always cast.
+const FIRST_SHADOW_RAYS: u32 = 2;
+
+/// Shadow rays where the first disagree.
+const SHADOW_RAYS: u32 = 16;
+
+/// Lights below this share of all light at a point, were there no shadows, are left out.
+const NEGLIGIBLE_SHARE: f32 = 2e-3;
+
+/// A sphere light; irradiance is `intensity cos θ / max(d², radius²)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SphereLight {
+    /// Centre, metres.
+    pub position: Vec3,
+    /// Metres.
+    pub radius: f32,
+    /// Radiant intensity per colour channel, W/sr.
+    pub intensity: Vec3,
+}
+
+/// Everything a ray needs to find its colour.
+#[derive(Clone, Copy)]
+pub struct LitScene<'a> {
+    /// The mesh.
+    pub mesh: &'a TriangleMesh,
+    /// Unit normals of the triangles' corners, for shading.
+    pub corner_normals: &'a [[Vec3; 3]],
+    /// The mesh's tree.
+    pub bvh: &'a Bvh,
+    /// From points of the mesh to walls of blocks.
+    pub receivers: &'a ReceiverMap,
+    /// From walls of blocks to the lightmap.
+    pub atlas: &'a AtlasLayout,
+    /// Indirect irradiance, W/m².
+    pub lightmap: &'a [[f32; 3]],
+    /// Lights, for the direct part.
+    pub lights: &'a [SphereLight],
+    /// Length that rays start off surfaces, metres.
+    pub restart: f32,
+    /// For views from outside: surfaces are invisible from behind and where no light of the level gets
+    /// to, such as roofs, so that one looks into the rooms.
+    pub hides_outside: bool,
+}
+
+/// What a ray sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Colours {
+    /// Radiance by direct light.
+    pub direct: Vec3,
+    /// Radiance by indirect light.
+    pub indirect: Vec3,
+}
+
+struct Surface {
+    position: Vec3,
+    /// Of the triangle, towards the viewer.
+    flat_normal: Vec3,
+    /// Smoothed, towards the viewer.
+    normal: Vec3,
+    albedo: Vec3,
+}
+
+impl LitScene<'_> {
+    /// The radiance that comes back along a ray with a unit direction; none where it hits nothing.
+    pub fn colours(&self, origin: Vec3, direction: Vec3) -> Colours {
+        let Some(surface) = self.surface(origin, direction) else {
+            return Colours::default();
+        };
+        let reflectance = surface.albedo / PI;
+        Colours {
+            direct: reflectance * self.direct(&surface),
+            indirect: reflectance * self.indirect(&surface),
+        }
+    }
+
+    fn surface(&self, mut origin: Vec3, direction: Vec3) -> Option<Surface> {
+        // Few surfaces lie behind one another; the bound is against rays along a stack of them.
+        for _ in 0..64 {
+            let hit = self.bvh.closest_hit(origin, direction, f32::INFINITY)?;
+            let triangle = hit.triangle as usize;
+            let [a, b, c] = self.mesh.corners(triangle);
+            let flat = (b - a).cross(c - a).normalize_or_zero();
+            let position = origin + direction * hit.t;
+            let is_back = flat.dot(direction) > 0.0;
+            if self.hides_outside && (is_back || self.is_outside(position, flat)) {
+                origin = position + direction * self.restart;
+                continue;
+            }
+            let towards_viewer = if is_back { -1.0 } else { 1.0 };
+            let [na, nb, nc] = self.corner_normals[triangle];
+            let smooth = na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v;
+            let material = self.mesh.triangle_materials[triangle] as usize;
+            return Some(Surface {
+                position,
+                flat_normal: flat * towards_viewer,
+                normal: smooth.try_normalize().unwrap_or(flat) * towards_viewer,
+                albedo: self.mesh.materials[material].albedo,
+            });
+        }
+        None
+    }
+
+    fn is_outside(&self, position: Vec3, normal: Vec3) -> bool {
+        let blend = self.receivers.blended(position, normal, |_| false);
+        let lit: f64 = blend.parts().iter().map(|(_, weight)| weight).sum();
+        lit < 0.5
+    }
+
+    /// Irradiance straight from the lights, with soft shadows.
+    fn direct(&self, surface: &Surface) -> Vec3 {
+        let seed = hash(surface.position.x.to_bits(), surface.position.z.to_bits());
+        let unshadowed = |light: &SphereLight| {
+            let offset = light.position - surface.position;
+            let squared = offset.length_squared().max(light.radius * light.radius);
+            let cosine = surface.normal.dot(offset.normalize_or_zero());
+            if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
+                return Vec3::ZERO;
+            }
+            light.intensity * (cosine / squared)
+        };
+        let most: Vec3 = self.lights.iter().map(unshadowed).sum();
+        let mut sum = Vec3::ZERO;
+        for light in self.lights {
+            let irradiance = unshadowed(light);
+            // Not worth a ray.
+            if irradiance.cmple(most * NEGLIGIBLE_SHARE).all() {
+                continue;
+            }
+            sum += irradiance * self.visible_share(surface, light, seed);
+        }
+        sum
+    }
+
+    /// Share of a light that is seen: a few rays where they agree, more in penumbras.
+    fn visible_share(&self, surface: &Surface, light: &SphereLight, seed: u32) -> f32 {
+        let distance = light.position.distance(surface.position);
+        let start = surface.position + surface.flat_normal * self.restart.min(1e-2 * distance);
+        let is_visible = |k: u32| {
+            let square = square_from_unit(sobol_point(k, seed));
+            let on_light = sphere_from_square(square).as_vec3() * light.radius;
+            let towards = light.position + on_light - start;
+            u32::from(!self.bvh.is_occluded(start, towards, 1.0))
+        };
+        let first: u32 = (0..FIRST_SHADOW_RAYS).map(is_visible).sum();
+        if first == 0 || first == FIRST_SHADOW_RAYS {
+            return (first / FIRST_SHADOW_RAYS) as f32;
+        }
+        let rest: u32 = (FIRST_SHADOW_RAYS..SHADOW_RAYS).map(is_visible).sum();
+        (first + rest) as f32 / SHADOW_RAYS as f32
+    }
+
+    fn blend(&self, surface: &Surface) -> Blend {
+        let start = surface.position + surface.flat_normal * self.restart;
+        self.receivers
+            .blended(surface.position, surface.normal, |place| {
+                !self.bvh.is_occluded(start, place - start, 1.0)
+            })
+    }
+
+    /// Irradiance from the lightmap: one wall would do, but curved surfaces would show where it changes.
+    fn indirect(&self, surface: &Surface) -> Vec3 {
+        self.blend(surface)
+            .parts()
+            .iter()
+            .filter_map(|(receiver, weight)| {
+                let (u, v) = (receiver.u as f32, receiver.v as f32);
+                let pixel = self.atlas.pixel(receiver.block, receiver.face, u, v)?;
+                let irradiance = self.atlas.sample(self.lightmap, pixel);
+                Some(Vec3::from_array(irradiance) * *weight as f32)
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,52 @@
+//! The mirrors that leave a canonical shape as it is.
+
+use crate::level::shape::{Outline, Shape};
+use glam::{DVec3, IVec3};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use std::collections::HashMap;
+
+/// True if the map takes every opening to one of the same outline; holes know up, so it must keep y there.
+fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
+    shape.openings.iter().all(|opening| {
+        let same = shape
+            .opening(map.face(opening.face))
+            .is_some_and(|image| image.outline == opening.outline);
+        let keeps_up = map.face(Face::PosY) == Face::PosY;
+        same && (keeps_up || opening.outline == Outline::Whole)
+    })
+}
+
+/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of
+/// two axes neither of which has one.
+pub fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
+    let axes: Vec<usize> = (0..3)
+        .filter(|&axis| keeps(CubeSymmetry::mirror(axis), shape))
+        .collect();
+    let exchange = [(0, 2), (0, 1), (1, 2)]
+        .into_iter()
+        .filter(|(a, b)| !axes.contains(a) && !axes.contains(b))
+        .map(|(a, b)| CubeSymmetry::exchange(a, b))
+        .find(|&map| keeps(map, shape));
+    axes.into_iter()
+        .map(CubeSymmetry::mirror)
+        .chain(exchange)
+        .collect()
+}
+
+/// Where a symmetry of a cube takes its texels.
+///
+/// # Panics
+/// If the symmetry does not keep the shape.
+pub fn texel_permutation(shape: &Shape, resolution: usize, map: CubeSymmetry) -> Vec<u32> {
+    // Texel centres are odd multiples of half a step: exact as integers.
+    let key = |face: Face, p: DVec3| -> (Face, IVec3) {
+        (face, (p * (2 * resolution) as f64).round().as_ivec3())
+    };
+    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
+    let index: HashMap<_, u32> = texels.iter().map(|&(f, p)| key(f, p)).zip(0..).collect();
+    texels
+        .iter()
+        .map(|&(face, p)| index[&key(map.face(face), map.point(p))])
+        .collect()
+}

@@ -1,0 +1,154 @@
+//! Finds blocks that share a volume, by separating axes over candidate pairs.
+
+use crate::level::block::{Level, LevelError, OVERLAP_TOLERANCE};
+use glam::DVec3;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
+
+/// Checks that no two blocks of the level enter each other deeper than [`OVERLAP_TOLERANCE`].
+///
+/// Blocks are taken as the convex hulls of their corners, which warped blocks stay inside of. Pairs
+/// are found by sweeping along x, so the cost is near-linear in levels that are not stacked up.
+pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
+    let bounds: Vec<_> = level.blocks.iter().map(|b| b.warp.bounds()).collect();
+    let mut order: Vec<usize> = (0..bounds.len()).collect();
+    order.sort_by(|&i, &j| bounds[i].0.x.total_cmp(&bounds[j].0.x));
+    let mut active: Vec<usize> = Vec::new();
+    let mut tests = 0;
+    for &b in &order {
+        active.retain(|&a| bounds[a].1.x > bounds[b].0.x);
+        for &a in &active {
+            let apart =
+                bounds[a].1.cmple(bounds[b].0).any() || bounds[b].1.cmple(bounds[a].0).any();
+            if apart {
+                continue;
+            }
+            let (warp_a, warp_b) = (&level.blocks[a].warp, &level.blocks[b].warp);
+            tests += 1;
+            if tests > MAX_TESTS_PER_BLOCK * bounds.len() {
+                return Err(LevelError::TooCrowded {
+                    expected: MAX_TESTS_PER_BLOCK,
+                });
+            }
+            // Hulls of bent blocks stick out of them by no more than their faces are bent.
+            let expected = OVERLAP_TOLERANCE * warp_a.diagonal().min(warp_b.diagonal())
+                + bend(warp_a)
+                + bend(warp_b);
+            let found = penetration(warp_a, warp_b, expected);
+            if found > expected {
+                return Err(LevelError::Overlap {
+                    a: a.min(b),
+                    b: a.max(b),
+                    expected,
+                    found,
+                });
+            }
+        }
+        active.push(b);
+    }
+    Ok(())
+}
+
+/// Pairs of blocks with overlapping bounds that are tested, at most, times the number of blocks. Real levels
+/// have a dozen neighbours a block.
+pub(crate) const MAX_TESTS_PER_BLOCK: usize = 256;
+
+/// How far a block's faces are from planar, metres: the largest distance between the two diagonals of a
+/// face.
+fn bend(block: &Hexahedron) -> f64 {
+    Face::ALL
+        .into_iter()
+        .map(|face| {
+            let [a, b, c, d] = block.face_corners(face);
+            let normal = (c - a).cross(d - b);
+            normal
+                .try_normalize()
+                .map_or(0.0, |normal| normal.dot(b - a).abs())
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Smallest overlap of the two hulls' shadows over all candidate axes, metres, or the first that is at
+/// most `enough`; negative when an axis separates them.
+fn penetration(a: &Hexahedron, b: &Hexahedron, enough: f64) -> f64 {
+    let (edges_a, edges_b) = (edges(a), edges(b));
+    let normals = [a, b].into_iter().flat_map(|block| {
+        Face::ALL
+            .into_iter()
+            .flat_map(move |face| triangle_normals(&block.face_corners(face)))
+    });
+    let crossed = edges_a
+        .iter()
+        .flat_map(|&x| edges_b.iter().map(move |&y| x.cross(y)));
+    let mut smallest = f64::MAX;
+    for axis in normals.chain(crossed).filter_map(DVec3::try_normalize) {
+        smallest = smallest.min(shadow_overlap(a, b, axis));
+        if smallest <= enough {
+            break;
+        }
+    }
+    smallest
+}
+
+fn shadow_overlap(a: &Hexahedron, b: &Hexahedron, axis: DVec3) -> f64 {
+    let shadow = |block: &Hexahedron| {
+        block
+            .corners
+            .iter()
+            .map(|corner| corner.dot(axis))
+            .fold((f64::MAX, f64::MIN), |(lo, hi), x| (lo.min(x), hi.max(x)))
+    };
+    let ((a_min, a_max), (b_min, b_max)) = (shadow(a), shadow(b));
+    (a_max - b_min).min(b_max - a_min)
+}
+
+/// A warped face may be bent: either diagonal may be the ridge of the hull.
+fn triangle_normals(quad: &[DVec3; 4]) -> [DVec3; 4] {
+    std::array::from_fn(|k| {
+        let [p, q, r] = [quad[k], quad[(k + 1) % 4], quad[(k + 2) % 4]];
+        (q - p).cross(r - p)
+    })
+}
+
+/// Edges of the hull: those of the cube, and the diagonals of faces, which may be bent along either.
+fn edges(block: &Hexahedron) -> Vec<DVec3> {
+    let mut edges = Vec::with_capacity(24);
+    for k in 0..8usize {
+        for axis in (0..3).filter(|axis| k >> axis & 1 == 0) {
+            edges.push(block.corners[k | 1 << axis] - block.corners[k]);
+        }
+    }
+    for face in Face::ALL {
+        let [a, b, c, d] = block.face_corners(face);
+        edges.extend([c - a, d - b]);
+    }
+    edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn touching_cells_do_not_overlap_and_shifted_ones_do() {
+        let a = Hexahedron::cell(DVec3::ZERO);
+        assert!(penetration(&a, &Hexahedron::cell(DVec3::X), -1.0).abs() < 1e-12);
+        let depth = penetration(&a, &Hexahedron::cell(DVec3::new(0.7, 0.1, 0.0)), -1.0);
+        assert!((depth - 0.3).abs() < 1e-12);
+        assert!(penetration(&a, &Hexahedron::cell(DVec3::new(3.0, 0.0, 0.0)), -9.0) < 0.0);
+    }
+
+    #[test]
+    fn joined_blocks_may_share_a_bent_face() {
+        use crate::level::block::Level;
+        use glam::Vec3;
+        let mut level =
+            Level::from_cells(&[[0, 0, 0], [1, 0, 0]], Vec3::ONE).expect("two flat cells");
+        for bent in [0.02, 0.1, 0.2] {
+            let corner = DVec3::new(1.0 + bent, 1.0, 1.0);
+            level.blocks[0].warp.corners[7] = corner;
+            level.blocks[1].warp.corners[6] = corner;
+            assert_eq!(level.check(), Ok(()), "bent by {bent}");
+        }
+    }
+}

@@ -1,0 +1,434 @@
+//! Levels as readable text (TOML), for people, scripts and version control.
+//!
+//! ```toml
+//! format = "mrt-level"
+//! version = 1
+//! connections = [[0, "+x", 1, "-x"]]
+//! doors = [[0, 1.0]]           # connection 0 can be closed; at first all its light passes
+//!
+//! [[block]]
+//! shape = "dead_end"
+//! cell = [0, 0, 0]             # or box = [[0, 0, 0], [2, 1, 1]], or corners = [eight points]
+//! albedo = [0.7, 0.7, 0.7]
+//!
+//! [[block]]
+//! shape = "dead_end"
+//! orientation = "-x+y"         # where the canonical +x and +y point
+//! cell = [1, 0, 0]
+//! albedo = [0.7, 0.7, 0.7]
+//! face_albedo = { "-y" = [0.4, 0.2, 0.1] }
+//! face_emission = { "+y" = [3.0, 3.0, 2.5] }   # W/m², a panel that is lit
+//! transport = "regathered"     # or "rebuilt": operators made for this warp by `mrt adapt`
+//! ```
+
+use crate::level::block::{Block, Connection, Door, Level, LevelError, MAX_BLOCKS, Opening};
+use crate::level::shape::{SHAPES, Shape};
+use crate::modular::dictionary::WarpTransport;
+use glam::{DVec3, Vec3};
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::hexahedron::Hexahedron;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The version that [`to_text`] writes.
+pub const LEVEL_VERSION: u32 = 1;
+
+const FORMAT: &str = "mrt-level";
+
+/// Bytes of text that [`from_text`] accepts: a block takes under 1,000.
+pub const MAX_TEXT_BYTES: usize = MAX_BLOCKS * 1_000;
+
+/// Why text is not a level.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum LevelTextError {
+    /// Longer than [`MAX_TEXT_BYTES`].
+    #[error("the level text has {found} bytes; expected at most {expected}")]
+    TooLong {
+        /// Most accepted.
+        expected: usize,
+        /// Length of the text.
+        found: usize,
+    },
+    /// Not TOML, or a key is missing, unknown or of the wrong type.
+    #[error("the level text is malformed: {0}")]
+    Malformed(String),
+    /// Some other file.
+    #[error("the level text has format `{found}`; expected `{FORMAT}`")]
+    NotALevel {
+        /// What `format` says.
+        found: String,
+    },
+    /// From another release.
+    #[error("the level text has version {found}; this release reads version {LEVEL_VERSION}")]
+    UnsupportedVersion {
+        /// What `version` says.
+        found: u32,
+    },
+    /// No such shape.
+    #[error("block {block}: shape `{found}`; expected one of {expected}")]
+    UnknownShape {
+        /// Which block.
+        block: usize,
+        /// Names of all shapes.
+        expected: String,
+        /// The name given.
+        found: String,
+    },
+    /// Not one of the 24 rotations.
+    #[error(
+        "block {block}: orientation `{found}`; expected two perpendicular directions such as `+x+y`"
+    )]
+    UnknownOrientation {
+        /// Which block.
+        block: usize,
+        /// The text given.
+        found: String,
+    },
+    /// None or several of `cell`, `box`, `corners`.
+    #[error("block {block}: {found} of `cell`, `box` and `corners` given; expected exactly one")]
+    Placement {
+        /// Which block.
+        block: usize,
+        /// How many were given.
+        found: usize,
+    },
+    /// Not a way to transport light in a warped block.
+    #[error(
+        "block {block}: transport `{found}`; expected one of {}",
+        WarpTransport::ALL.map(WarpTransport::name).join(", ")
+    )]
+    UnknownTransport {
+        /// Which block.
+        block: usize,
+        /// The text given.
+        found: String,
+    },
+    /// Not a face.
+    #[error("{place}: face `{found}`; expected -x, +x, -y, +y, -z or +z")]
+    UnknownFace {
+        /// Which block or connection.
+        place: String,
+        /// The text given.
+        found: String,
+    },
+    /// Readable, but not a consistent level.
+    #[error(transparent)]
+    Level(#[from] LevelError),
+}
+
+#[derive(Deserialize)]
+struct Header {
+    #[serde(default)]
+    format: String,
+    #[serde(default)]
+    version: u32,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LevelText {
+    format: String,
+    version: u32,
+    #[serde(default)]
+    connections: Vec<(usize, String, usize, String)>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    doors: Vec<(usize, f32)>,
+    #[serde(default, rename = "block")]
+    blocks: Vec<BlockText>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BlockText {
+    shape: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    orientation: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    cell: Option<[f64; 3]>,
+    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
+    cuboid: Option<[[f64; 3]; 2]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    corners: Option<[[f64; 3]; 8]>,
+    albedo: [f32; 3],
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    face_albedo: BTreeMap<String, [f32; 3]>,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    face_emission: BTreeMap<String, [f32; 3]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    transport: Option<String>,
+}
+
+/// Reads and checks a level.
+///
+/// # Errors
+/// [`LevelTextError`], with the place in the text where the parser knows it.
+pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
+    if text.len() > MAX_TEXT_BYTES {
+        return Err(LevelTextError::TooLong {
+            expected: MAX_TEXT_BYTES,
+            found: text.len(),
+        });
+    }
+    let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
+    // Format and version first, whatever keys another version has.
+    let header: Header = toml::from_str(text).map_err(malformed)?;
+    if header.format != FORMAT {
+        return Err(LevelTextError::NotALevel {
+            found: header.format,
+        });
+    }
+    if header.version != LEVEL_VERSION {
+        return Err(LevelTextError::UnsupportedVersion {
+            found: header.version,
+        });
+    }
+    let text: LevelText = toml::from_str(text).map_err(malformed)?;
+    let blocks = text
+        .blocks
+        .iter()
+        .enumerate()
+        .map(|(index, block)| read_block(index, block))
+        .collect::<Result<_, _>>()?;
+    let connections = text
+        .connections
+        .iter()
+        .enumerate()
+        .map(|(index, (a, a_face, b, b_face))| {
+            let end = |block: usize, face: &str| {
+                let face = read_face(face, || format!("connection {index}"))?;
+                Ok::<_, LevelTextError>(Opening { block, face })
+            };
+            Ok(Connection {
+                a: end(*a, a_face)?,
+                b: end(*b, b_face)?,
+            })
+        })
+        .collect::<Result<_, LevelTextError>>()?;
+    let doors = text
+        .doors
+        .iter()
+        .map(|&(connection, value)| Door { connection, value })
+        .collect();
+    let level = Level {
+        blocks,
+        connections,
+        doors,
+    };
+    level.check()?;
+    Ok(level)
+}
+
+/// The parser's message with its place, without the excerpt that it draws over several lines.
+fn one_line(text: &str, error: &toml::de::Error) -> String {
+    let message = error.message().trim().replace('\n', "; ");
+    match error.span().and_then(|span| text.get(..span.start)) {
+        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
+        None => message,
+    }
+}
+
+fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
+    let shape = Shape::from_name(&text.shape).ok_or_else(|| LevelTextError::UnknownShape {
+        block: index,
+        expected: SHAPES.each_ref().map(|shape| shape.name).join(", "),
+        found: text.shape.clone(),
+    })?;
+    let orientation = match &text.orientation {
+        None => CubeRotation::IDENTITY,
+        Some(name) => {
+            CubeRotation::from_name(name).ok_or_else(|| LevelTextError::UnknownOrientation {
+                block: index,
+                found: name.clone(),
+            })?
+        }
+    };
+    let warp = match (text.cell, text.cuboid, text.corners) {
+        (Some(min), None, None) => Hexahedron::cell(DVec3::from_array(min)),
+        (None, Some([min, max]), None) => {
+            Hexahedron::cuboid(DVec3::from_array(min), DVec3::from_array(max))
+        }
+        (None, None, Some(corners)) => Hexahedron {
+            corners: corners.map(DVec3::from_array),
+        },
+        (cell, cuboid, corners) => {
+            return Err(LevelTextError::Placement {
+                block: index,
+                found: usize::from(cell.is_some())
+                    + usize::from(cuboid.is_some())
+                    + usize::from(corners.is_some()),
+            });
+        }
+    };
+    let mut block = Block::new(shape, orientation, warp, Vec3::from_array(text.albedo));
+    for (name, albedo) in &text.face_albedo {
+        let face = read_face(name, || format!("block {index}"))?;
+        block.albedo[face.index()] = Vec3::from_array(*albedo);
+    }
+    for (name, emission) in &text.face_emission {
+        let face = read_face(name, || format!("block {index}"))?;
+        block.emission[face.index()] = Vec3::from_array(*emission);
+    }
+    if let Some(name) = &text.transport {
+        block.transport =
+            WarpTransport::from_name(name).ok_or_else(|| LevelTextError::UnknownTransport {
+                block: index,
+                found: name.clone(),
+            })?;
+    }
+    Ok(block)
+}
+
+fn read_face(name: &str, place: impl FnOnce() -> String) -> Result<Face, LevelTextError> {
+    Face::from_name(name).ok_or_else(|| LevelTextError::UnknownFace {
+        place: place(),
+        found: name.to_owned(),
+    })
+}
+
+/// Writes a level; [`from_text`] gives the same level back, to the last bit.
+///
+/// # Errors
+/// [`LevelTextError::Malformed`] if a value has no form in TOML.
+pub fn to_text(level: &Level) -> Result<String, LevelTextError> {
+    let text = LevelText {
+        format: FORMAT.to_owned(),
+        version: LEVEL_VERSION,
+        connections: level
+            .connections
+            .iter()
+            .map(|c| {
+                let name = |face: Face| face.name().to_owned();
+                (c.a.block, name(c.a.face), c.b.block, name(c.b.face))
+            })
+            .collect(),
+        doors: level
+            .doors
+            .iter()
+            .map(|door| (door.connection, door.value))
+            .collect(),
+        blocks: level.blocks.iter().map(write_block).collect(),
+    };
+    toml::to_string(&text).map_err(|error| LevelTextError::Malformed(error.to_string()))
+}
+
+fn write_block(block: &Block) -> BlockText {
+    let (min, max) = block.warp.bounds();
+    let is_cuboid = Hexahedron::cuboid(min, max) == block.warp;
+    let is_cell = is_cuboid && max == min + DVec3::ONE;
+    // The commonest albedo is the block's; the others are named.
+    let uses = |albedo: &Vec3| block.albedo.iter().filter(|&a| a == albedo).count();
+    let common = block
+        .albedo
+        .iter()
+        .max_by_key(|albedo| uses(albedo))
+        .copied()
+        .unwrap_or(Vec3::ZERO);
+    let others = Face::ALL
+        .into_iter()
+        .filter(|face| block.albedo[face.index()] != common)
+        .map(|face| {
+            let albedo = block.albedo[face.index()].to_array();
+            (face.name().to_owned(), albedo)
+        });
+    BlockText {
+        shape: block.shape.name.to_owned(),
+        orientation: (block.orientation != CubeRotation::IDENTITY)
+            .then(|| block.orientation.name()),
+        cell: is_cell.then(|| min.to_array()),
+        cuboid: (is_cuboid && !is_cell).then(|| [min.to_array(), max.to_array()]),
+        corners: (!is_cuboid).then(|| block.warp.corners.map(|corner| corner.to_array())),
+        albedo: common.to_array(),
+        face_albedo: others.collect(),
+        face_emission: Face::ALL
+            .into_iter()
+            .filter(|face| block.emission[face.index()] != Vec3::ZERO)
+            .map(|face| {
+                let emission = block.emission[face.index()].to_array();
+                (face.name().to_owned(), emission)
+            })
+            .collect(),
+        transport: (block.transport != WarpTransport::Canonical)
+            .then(|| block.transport.name().to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sample() -> Level {
+        let cells = [[0, 0, 0], [1, 0, 0], [1, 0, 1]];
+        let mut level = Level::from_cells(&cells, Vec3::splat(0.7)).expect("flat cells");
+        level.blocks[1].albedo[Face::NegY.index()] = Vec3::new(0.4, 0.2, 0.1);
+        level.blocks[0].emission[Face::PosY.index()] = Vec3::new(3.0, 2.0, 1.0 / 3.0);
+        level.doors.push(Door {
+            connection: 1,
+            value: 0.3,
+        });
+        level.blocks[1].transport = WarpTransport::Regathered;
+        level.blocks[2].transport = WarpTransport::Rebuilt;
+        level.blocks[2].warp.corners[7] += DVec3::new(0.1, 0.2, 1.0 / 3.0);
+        level
+    }
+
+    #[test]
+    fn text_keeps_every_bit() {
+        let level = sample();
+        let text = to_text(&level).expect("writes");
+        assert_eq!(from_text(&text), Ok(level));
+    }
+
+    #[test]
+    fn each_fault_has_its_error() {
+        let good = to_text(&sample()).expect("writes");
+        let fault = |from: &str, to: &str| {
+            assert!(good.contains(from), "{from} is not in the text");
+            from_text(&good.replacen(from, to, 1)).expect_err("refused")
+        };
+        assert!(matches!(
+            fault("\"mrt-level\"", "\"bevy-scene\""),
+            LevelTextError::NotALevel { .. }
+        ));
+        assert_eq!(
+            fault("version = 1", "version = 7"),
+            LevelTextError::UnsupportedVersion { found: 7 }
+        );
+        assert!(matches!(
+            fault("\"corner\"", "\"sphere\""),
+            LevelTextError::UnknownShape { block: 1, .. }
+        ));
+        assert!(matches!(
+            fault("orientation = \"+z+y\"", "orientation = \"+z-z\""),
+            LevelTextError::UnknownOrientation { .. }
+        ));
+        assert!(matches!(
+            fault("\"rebuilt\"", "\"perfect\""),
+            LevelTextError::UnknownTransport { block: 2, .. }
+        ));
+        assert!(!good.contains("canonical"));
+        assert!(matches!(
+            fault("\"+x\"", "\"up\""),
+            LevelTextError::UnknownFace { .. }
+        ));
+        assert!(matches!(
+            fault("albedo = [0.7", "albedo = [nan"),
+            LevelTextError::Level(LevelError::Albedo { .. })
+        ));
+        assert!(matches!(
+            fault("cell = [0.0, 0.0, 0.0]\n", ""),
+            LevelTextError::Placement { found: 0, .. }
+        ));
+        assert!(matches!(
+            fault("cell = [0.0, 0.0, 0.0]", "cell = [0.0, 0.1, 0.0]"),
+            LevelTextError::Level(LevelError::InterfaceMismatch { .. })
+        ));
+        assert!(matches!(
+            from_text("format = "),
+            Err(LevelTextError::Malformed(_))
+        ));
+        assert_eq!(
+            from_text("format = \"mrt-level\"\nversion = 1"),
+            Err(LevelTextError::Level(LevelError::Empty))
+        );
+    }
+}

@@ -1,0 +1,159 @@
+//! Where the walls of a shape are: flat faces of the cube, or the charts of a round tube (Loos et al. 2011,
+//! section 6.1).
+
+use crate::level::shape::Shape;
+use glam::{DMat3, DVec3};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::hexahedron::Hexahedron;
+
+/// A point of a wall, in the unit cube.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WallPoint {
+    /// In the unit cube.
+    pub position: DVec3,
+    /// Unit normal into the block.
+    pub normal: DVec3,
+}
+
+impl WallPoint {
+    /// Unit normal into the block of the same point on the warped wall.
+    pub fn warped_normal(&self, warp: &Hexahedron) -> DVec3 {
+        // Gradients transform by the inverse transpose, which keeps their side of the wall.
+        let jacobian = warp.jacobian(self.position);
+        (jacobian.inverse().transpose() * self.normal).normalize()
+    }
+}
+
+/// From the world to the unit cube of a block.
+#[derive(Clone, Copy, Debug)]
+pub struct UnitFromWorld {
+    warp: Hexahedron,
+    /// Matrix and origin, if the warp is affine: one product, where Newton's method takes microseconds.
+    affine: Option<(DMat3, DVec3)>,
+}
+
+/// Corners this near to those of an affine map, in diagonals of the block, are its corners: a hundred roundings of
+/// coordinates at [`FAR_LIMIT`](crate::level::block::FAR_LIMIT).
+const AFFINE_TOLERANCE: f64 = 1e-10;
+
+impl UnitFromWorld {
+    /// The inverse of a warp.
+    pub fn new(warp: &Hexahedron) -> Self {
+        let jacobian = warp.jacobian(DVec3::splat(0.5));
+        let origin = warp.center() - jacobian * DVec3::splat(0.5);
+        let is_affine = (0..8).all(|k| {
+            let corner = origin + jacobian * Hexahedron::unit_corner(k);
+            corner.distance(warp.corners[k]) <= AFFINE_TOLERANCE * warp.diagonal()
+        });
+        Self {
+            warp: *warp,
+            affine: is_affine.then(|| (jacobian.inverse(), origin)),
+        }
+    }
+
+    /// The point of the unit cube, or beside it; its middle for points too far from a warped block.
+    pub fn point(&self, world: DVec3) -> DVec3 {
+        match self.affine {
+            Some((inverse, origin)) => inverse * (world - origin),
+            None => self.warp.inverse(world).unwrap_or(DVec3::splat(0.5)),
+        }
+    }
+}
+
+impl Shape {
+    /// The point at (u, v) in [0, 1]² of a wall; the charts of a tube go on beyond [0, 1] in v, around it.
+    pub fn wall_point(&self, wall: Face, u: f64, v: f64) -> WallPoint {
+        match self.tube() {
+            None => WallPoint {
+                position: wall.point(u, v),
+                normal: -wall.outward(),
+            },
+            Some(form) => {
+                let point = form.surface(wall, u, v);
+                WallPoint {
+                    position: point.position,
+                    normal: point.normal,
+                }
+            }
+        }
+    }
+
+    /// Index within its wall of the texel at (u, v) of the wall.
+    pub fn texel_of_uv(resolution: usize, u: f64, v: f64) -> usize {
+        let index = |x: f64| ((x * resolution as f64) as usize).min(resolution - 1);
+        index(v) * resolution + index(u)
+    }
+
+    /// Area of each texel over that of a cube's; empty for cubes, where all are 1.
+    pub fn relative_texel_areas(&self, resolution: usize) -> Vec<f32> {
+        let Some(form) = self.tube() else {
+            return Vec::new();
+        };
+        let of_cube = 1.0 / (resolution * resolution) as f64;
+        self.walls()
+            .flat_map(|face| (0..resolution).map(move |j| form.texel_area(face, resolution, j)))
+            .flat_map(|area| std::iter::repeat_n((area / of_cube) as f32, resolution))
+            .collect()
+    }
+
+    /// True when a point of the unit cube is inside the walls, or outside a round one by at most `tolerance`.
+    pub fn is_inside_walls(&self, unit: DVec3, tolerance: f64) -> bool {
+        self.tube()
+            .is_none_or(|form| form.wall_distance(unit) >= -tolerance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::level::shape::SHAPES;
+
+    #[test]
+    fn texels_are_where_their_uv_is() {
+        for shape in &SHAPES {
+            for (k, (face, center)) in shape.texels(3).enumerate() {
+                let (row, column) = (k % 9 / 3, k % 3);
+                let (u, v) = ((column as f64 + 0.5) / 3.0, (row as f64 + 0.5) / 3.0);
+                // Roundings of u and v.
+                assert!(shape.wall_point(face, u, v).position.distance(center) < 1e-14);
+                assert_eq!(Shape::texel_of_uv(3, u, v), k % 9);
+                assert!(shape.is_inside_walls(center, 1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn normals_of_warped_walls_are_perpendicular_to_them() {
+        let mut warp = Hexahedron::cuboid(DVec3::ZERO, DVec3::new(2.0, 1.0, 0.5));
+        warp.corners[3] += DVec3::new(0.1, 0.2, 0.05);
+        for shape in SHAPES.iter().filter(|shape| shape.wall_count() > 0) {
+            for face in shape.walls() {
+                let (step, at) = (1e-6, |u, v| {
+                    warp.point(shape.wall_point(face, u, v).position)
+                });
+                let normal = shape.wall_point(face, 0.3, 0.6).warped_normal(&warp);
+                for tangent in [at(0.3 + step, 0.6), at(0.3, 0.6 + step)] {
+                    let tangent = (tangent - at(0.3, 0.6)) / step;
+                    // A finite difference over curvatures of up to 4.
+                    assert!(normal.dot(tangent).abs() < 1e-5, "{} {face}", shape.name);
+                }
+                assert!(
+                    normal.dot(warp.point(DVec3::splat(0.5)) - at(0.3, 0.6)) > 0.0
+                        || shape.name == "bend"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn areas_add_up_to_the_walls() {
+        for shape in &SHAPES {
+            let Some(form) = shape.tube() else { continue };
+            let areas = shape.relative_texel_areas(8);
+            assert_eq!(areas.len(), shape.texel_count(8));
+            let sum = f64::from(areas.iter().sum::<f32>()) / 64.0;
+            // 256 roundings of f32.
+            assert!((sum / form.wall_area() - 1.0).abs() < 1e-5, "{sum}");
+        }
+    }
+}

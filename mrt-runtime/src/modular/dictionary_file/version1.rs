@@ -1,0 +1,266 @@
+//! Reads version 1, whose operators are those of the paper.
+//!
+//! It has no path table, and a response basis for all openings where version 2 has a joint basis a shape. Both are
+//! special cases: lightfield modes serve as emission modes, so `R_b->rlf` as emission; and the columns of a
+//! joint basis are those of `U_b`, then for each opening those of `U_r` as light through it meets the walls, each
+//! response being a joint coefficient. Scenes are then lit by passing on lightfields, with the same products as
+//! ever.
+//!
+//! Sections: `preset`, `settings`, `sizes` (resolution, shapes, lightfield modes, response modes), `left`,
+//! `straight`, `right`, `T_rlf_r`, `U_r` (on the five walls of the cube open at -z), `dropped` (of lightfield and
+//! response modes); for shape n `n.name`, `n.sigma`, `n.T_d_b`, `n.U_b`, `n.L_imp`, `n.drop` and one `n.R<m>` an
+//! opening. All numbers are F32. Shapes opened sideways only.
+
+use super::write::scales_name;
+use super::{DictionaryError, MAX_MODES, MAX_RESOLUTION, SHAPES, Source, check_size, known_shape};
+use crate::level::shape::{Outline, Shape};
+use crate::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, OperatorKind, OperatorMatrix, PathTable, ShapeOperators,
+    StoredDictionary,
+};
+use crate::modular::path::frame_of_heading;
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::storage::{Storage, StoredMatrix, StoredSection, read_stored};
+
+/// Shapes that version 1 knows.
+const SHAPE_COUNT: usize = 6;
+
+pub(super) fn read<'a>(
+    source: &mut Source<'a, '_, '_>,
+) -> Result<StoredDictionary<'a>, DictionaryError> {
+    let [resolution, shape_count, fields, responses] = source.sizes("sizes")?;
+    check_size("resolution", resolution, 1, MAX_RESOLUTION)?;
+    check_size("number of shapes", shape_count, 1, SHAPE_COUNT)?;
+    check_size("number of lightfield modes", fields, 1, MAX_MODES)?;
+    check_size("number of response modes", responses, 1, MAX_MODES)?;
+    let receiver_texels = 5 * resolution * resolution;
+    let kind = OperatorKind::Lightfield;
+    let dropped = source.numbers("dropped", 2)?;
+    let left = source.old_matrix(kind, "left", [fields, fields])?;
+    let right = source.old_matrix(kind, "right", [fields, fields])?;
+    let identity = source.owned(kind, fields, fields, |i, j| if i == j { 1.0 } else { 0.0 })?;
+    let lightfields = LightfieldOperators {
+        parity: mirror_parity(&left, &right)?,
+        from_emission: identity,
+        straight: source.old_matrix(kind, "straight", [fields, fields])?,
+        left,
+        exchange: StoredMatrix::empty(0, fields),
+        holes: Vec::new(),
+        response_from_lightfield: source.old_matrix(kind, "T_rlf_r", [responses, fields])?,
+        dropped_energy: dropped[0],
+    };
+    let response_basis = source.old_matrix(
+        OperatorKind::ResponseSource,
+        "U_r",
+        [receiver_texels, responses],
+    )?;
+    let mut shapes: Vec<ShapeOperators<StoredMatrix>> = Vec::with_capacity(shape_count);
+    for index in 0..shape_count {
+        let entry = read_shape(source, index, resolution, fields, &response_basis)?;
+        if shapes.iter().any(|other| other.shape == entry.shape) {
+            return Err(DictionaryError::ShapeTwice {
+                found: entry.shape.name,
+            });
+        }
+        shapes.push(entry);
+    }
+    Ok(StoredDictionary {
+        preset: source.container.text("preset")?.to_owned(),
+        settings: source.container.text("settings")?.to_owned(),
+        resolution,
+        probes: 0,
+        shapes,
+        lightfields,
+        paths: PathTable {
+            // Only shapes that open upwards ask for these, and paths of a table.
+            emission_parity: vec![0; fields],
+            response_parity: vec![0; responses],
+            depth: 0,
+            hole_depth: 0,
+            entries: Vec::new(),
+            emission_dropped_energy: 0.0,
+            response_dropped_energy: dropped[1],
+        },
+        variants: Vec::new(),
+        sources: None,
+    })
+}
+
+impl<'a> Source<'a, '_, '_> {
+    fn old_matrix(
+        &mut self,
+        kind: OperatorKind,
+        section: &str,
+        [rows, columns]: [usize; 2],
+    ) -> Result<StoredMatrix<'a>, DictionaryError> {
+        self.check_length(section, rows * columns)?;
+        let section = StoredSection {
+            values: section,
+            // This version had none: other types than F32 are refused for want of it.
+            scales: &scales_name(section),
+            rows,
+            columns,
+            modes: kind.modes(),
+        };
+        Ok(read_stored(self.container, &section, self.budget)?)
+    }
+
+    /// A matrix that the file does not hold.
+    fn owned(
+        &mut self,
+        kind: OperatorKind,
+        rows: usize,
+        columns: usize,
+        f: impl FnMut(usize, usize) -> f32,
+    ) -> Result<StoredMatrix<'a>, DictionaryError> {
+        // Once for the matrix, once for its form as stored.
+        let bytes = 2 * size_of::<f32>() as u64 * rows as u64 * columns as u64;
+        self.budget.spend("operators of version 1", bytes)?;
+        let matrix = Matrix::from_fn(rows, columns, f);
+        Ok(StoredMatrix::encode(&matrix, Storage::F32, kind.modes()))
+    }
+}
+
+/// Which modes are odd in x: the mirror makes `right` of `left`, right = D left D with signs D.
+///
+/// Signs of modes that no sequence of elements joins are free, and then do not matter: odd ones among them would
+/// change no product.
+fn mirror_parity(left: &StoredMatrix, right: &StoredMatrix) -> Result<Vec<u8>, DictionaryError> {
+    let modes = left.rows();
+    let mut parity: Vec<Option<u8>> = vec![None; modes];
+    for root in 0..modes {
+        if parity[root].is_some() {
+            continue;
+        }
+        parity[root] = Some(0);
+        let mut reached = vec![root];
+        while let Some(i) = reached.pop() {
+            let own = parity[i].unwrap_or(0);
+            for (j, other) in parity.iter_mut().enumerate().filter(|(_, p)| p.is_none()) {
+                let pairs = [(i, j), (j, i)].map(|(r, c)| (left.get(r, c), right.get(r, c)));
+                if let Some((l, r)) = pairs.into_iter().find(|(l, _)| *l != 0.0) {
+                    *other = Some(own ^ u8::from((l < 0.0) != (r < 0.0)));
+                    reached.push(j);
+                }
+            }
+        }
+    }
+    let parity: Vec<u8> = parity.into_iter().map(|p| p.unwrap_or(0)).collect();
+    for column in 0..modes {
+        for row in 0..modes {
+            let l = left.get(row, column);
+            let expected = if parity[row] == parity[column] { l } else { -l };
+            let found = right.get(row, column);
+            if found != expected {
+                return Err(DictionaryError::NotMirrored {
+                    row,
+                    column,
+                    expected,
+                    found,
+                });
+            }
+        }
+    }
+    Ok(parity)
+}
+
+fn read_shape<'a>(
+    source: &mut Source<'a, '_, '_>,
+    index: usize,
+    resolution: usize,
+    fields: usize,
+    response_basis: &StoredMatrix,
+) -> Result<ShapeOperators<StoredMatrix<'a>>, DictionaryError> {
+    let section = |suffix: &str| format!("{index}.{suffix}");
+    let shape = known_shape(index, source.container.text(&section("name"))?)?;
+    // Names that came later are as unknown here as made-up ones.
+    if !opens_sideways(shape) {
+        return Err(DictionaryError::UnknownShape {
+            index,
+            expected: SHAPES[..SHAPE_COUNT]
+                .iter()
+                .map(|shape| shape.name)
+                .collect::<Vec<_>>()
+                .join(", "),
+            found: shape.name.to_owned(),
+        });
+    }
+    let modes = source.container.element_count(&section("sigma"))?;
+    check_size("number of modes", modes, 1, MAX_MODES)?;
+    let texels = shape.texel_count(resolution);
+    let responses = response_basis.columns();
+    let joint_modes = modes + shape.openings.len() * responses;
+    let own = source.old_matrix(OperatorKind::JointBasis, &section("U_b"), [texels, modes])?;
+    let rows: Vec<Vec<usize>> = shape
+        .openings
+        .iter()
+        .map(|opening| receiver_texels(shape, opening.face, resolution))
+        .collect();
+    let joint_basis = source.owned(
+        OperatorKind::JointBasis,
+        texels,
+        joint_modes,
+        |i, j| match j.checked_sub(modes) {
+            None => own.get(i, j),
+            Some(k) => response_basis.get(rows[k / responses][i], k % responses),
+        },
+    )?;
+    let mut openings = Vec::with_capacity(shape.openings.len());
+    for m in 0..shape.openings.len() {
+        let first = modes + m * responses;
+        openings.push(OpeningOperators {
+            emission_from_coefficients: vec![source.old_matrix(
+                OperatorKind::Emission,
+                &section(&format!("R{m}")),
+                [fields, modes],
+            )?],
+            joint_from_response: vec![source.owned(
+                OperatorKind::JointFromResponse,
+                joint_modes,
+                responses,
+                |i, j| if i == first + j { 1.0 } else { 0.0 },
+            )?],
+        });
+    }
+    Ok(ShapeOperators {
+        shape,
+        coefficients_from_direct: source.old_matrix(
+            OperatorKind::CoefficientsFromDirect,
+            &section("T_d_b"),
+            [modes, texels],
+        )?,
+        joint_basis,
+        probe_basis: StoredMatrix::empty(0, joint_modes),
+        vector_basis: StoredMatrix::empty(0, joint_modes),
+        openings,
+        implicit_lighting: source.old_matrix(
+            OperatorKind::ImplicitLighting,
+            &section("L_imp"),
+            [texels, modes],
+        )?,
+        singular_values: source.numbers(&section("sigma"), modes)?,
+        dropped_energy: source.numbers(&section("drop"), 1)?[0],
+        // Nothing is projected: each response is a joint coefficient.
+        joint_dropped_energy: 0.0,
+    })
+}
+
+fn opens_sideways(shape: &Shape) -> bool {
+    let mut openings = shape.openings.iter();
+    openings.all(|opening| opening.outline == Outline::Whole && opening.face.axis() != 1)
+}
+
+/// Rows of `U_r` of a shape's texels, for light that enters by a face: the cube open at -z, turned about +Y to it.
+fn receiver_texels(shape: &Shape, entered: Face, resolution: usize) -> Vec<usize> {
+    let canonical: CubeSymmetry = frame_of_heading(entered.opposite()).inverse();
+    shape
+        .texels(resolution)
+        .map(|(face, point)| {
+            let (face, point) = (canonical.face(face), canonical.point(point));
+            let wall = face.index() - usize::from(face > Face::NegZ);
+            wall * resolution * resolution + face.texel_index(point, resolution)
+        })
+        .collect()
+}

@@ -1,0 +1,104 @@
+//! Leaves out of a dictionary what a level does not use, so that a game ships no more.
+
+use crate::level::block::Level;
+use crate::modular::assemble::{
+    AssembleError, Coupling, place_blocks, usable_coupling, used_operators,
+};
+use crate::modular::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
+use crate::modular::propagate::used_paths;
+
+/// What of a dictionary is kept beside the operators that the level uses.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PackConfig {
+    /// Bases of probes.
+    pub probes: bool,
+    /// Bases of vector irradiance.
+    pub vector: bool,
+    /// What tools need and frames do not: `L_imp`, and with probes [`Dictionary::sources`].
+    pub sources: bool,
+    /// Lightfields, for [`Coupling::Lightfield`].
+    pub lightfields: bool,
+}
+
+impl Default for PackConfig {
+    /// All that frames can use.
+    fn default() -> Self {
+        Self {
+            probes: true,
+            vector: true,
+            sources: false,
+            lightfields: true,
+        }
+    }
+}
+
+/// The part of a dictionary that a level uses: its shapes, their variants, and the paths that light takes in it.
+///
+/// With lightfields kept, scenes are the same to the last bit, whatever the depth to which light is followed; without,
+/// light ends at the table's longest path. Matrices are cloned, which
+/// copies those that are not borrowed.
+///
+/// # Errors
+/// As [`assemble`](crate::modular::assemble::assemble) with default settings, but for [`AssembleError::TooLarge`].
+pub fn pack<M: OperatorMatrix>(
+    level: &Level,
+    dictionary: &Dictionary<M>,
+    config: &PackConfig,
+) -> Result<Dictionary<M>, AssembleError> {
+    level.check()?;
+    let (used, operators_of_block) = used_operators(level, dictionary)?;
+    let blocks = place_blocks(level, dictionary, &used, &operators_of_block)?;
+    let needs_lightfields =
+        usable_coupling(level, dictionary, Coupling::Table)? == Coupling::Lightfield;
+    let used_paths = used_paths(&blocks, &dictionary.paths)?;
+    // Everything but the matrices is small, so leaving out is simpler than choosing.
+    let mut packed = dictionary.clone();
+    packed
+        .shapes
+        .retain(|entry| level.blocks.iter().any(|block| block.shape == entry.shape));
+    let is_used = |entry: &ShapeOperators<M>| used.iter().any(|&other| std::ptr::eq(other, entry));
+    packed.variants = dictionary
+        .variants
+        .iter()
+        .filter(|variant| is_used(&variant.operators))
+        .cloned()
+        .collect();
+    let mut used_paths = used_paths.into_iter();
+    packed
+        .paths
+        .entries
+        .retain(|_| used_paths.next() == Some(true));
+    let variants = packed.variants.iter_mut().map(|v| &mut v.operators);
+    for entry in packed.shapes.iter_mut().chain(variants) {
+        let joint_modes = entry.joint_modes();
+        if !config.probes {
+            entry.probe_basis = M::empty(0, joint_modes);
+        }
+        if !config.vector {
+            entry.vector_basis = M::empty(0, joint_modes);
+        }
+        if !config.sources {
+            entry.implicit_lighting = M::empty(0, entry.modes());
+        }
+    }
+    if !config.probes {
+        packed.probes = 0;
+    }
+    // A response basis has rows for probes, so there is none for a dictionary that lost them.
+    if !config.sources || packed.probes != dictionary.probes {
+        packed.sources = None;
+    }
+    if !config.lightfields && !needs_lightfields {
+        packed.lightfields = LightfieldOperators {
+            parity: Vec::new(),
+            from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
+            straight: M::empty(0, 0),
+            left: M::empty(0, 0),
+            exchange: M::empty(0, 0),
+            holes: Vec::new(),
+            response_from_lightfield: M::empty(dictionary.response_modes(), 0),
+            dropped_energy: dictionary.lightfields.dropped_energy,
+        };
+    }
+    Ok(packed)
+}

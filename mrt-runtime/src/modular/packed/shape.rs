@@ -1,0 +1,404 @@
+//! The operators of one shape, folded and packed.
+
+use super::Values;
+use super::folding::{Classes, Folding};
+use crate::level::shape::Shape;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::simd::Aligned;
+use mrt_core::simd::rows::DOT_ROWS;
+use mrt_core::simd::tiles::{ColumnLists, HALF_TILE, TILE};
+use mrt_core::storage::Storage;
+use std::ops::Range;
+
+/// Operators of a shape as frames read them.
+#[derive(Clone, Debug)]
+pub struct PackedShape {
+    /// Where texels are kept.
+    pub folding: Folding,
+    /// Number of modes `k_b`.
+    pub modes: usize,
+    /// Number of joint modes.
+    pub joint_modes: usize,
+    /// Rows that there are coefficients for, a channel: joint modes and padding. Coefficients b take those of the joint
+    /// modes that are theirs, and all others are zero.
+    ///
+    /// Modes of one class stand together: light that goes from block to block keeps its parity under the mirrors that the
+    /// blocks share, and then half of a tile's columns or more are zero.
+    pub rows: usize,
+    /// By joint mode: its row. The first joint modes are those of coefficients b.
+    pub(crate) row_of_mode: Vec<u16>,
+    /// `u16::MAX` for padding.
+    mode_of_row: Vec<u16>,
+    /// `T_d->b`, in groups of rows of one class; each row has one number an orbit.
+    pub(crate) from_direct: Values,
+    pub(crate) groups: Vec<Group>,
+    /// The joint basis: tile after tile of orbits, in a tile one column a mode, class after class.
+    pub(crate) joint: Values,
+    /// By class: the rows of its joint modes.
+    pub(crate) joint_classes: Vec<Range<usize>>,
+    /// What coefficients are multiplied by, by row; empty if by 1.
+    pub(crate) joint_scales: Vec<f32>,
+    /// All rows.
+    pub(crate) row_tiles: Vec<RowTile>,
+    /// By joint mode: a power of two near the size of its light. Responses are stored in such units, so that strong modes
+    /// do not take all the digits.
+    pub(crate) units: Vec<f32>,
+    /// By row: one over the unit of its mode.
+    pub(crate) row_inverses: Aligned<f32>,
+    /// By row: the largest number of its mode, at texels and among the coefficients of probes and of vector irradiance.
+    pub(crate) peaks: Aligned<f32>,
+    /// Area of the walls, in units of a canonical texel's.
+    pub(crate) area: f32,
+    /// Size of the light of each joint mode, and of the light that makes each coefficient.
+    pub(crate) joint_norms: Vec<f32>,
+    pub(crate) coefficient_norms: Vec<f32>,
+    /// SH coefficients of probes, coefficient by coefficient and in that probe by probe.
+    pub(crate) probes: Tiled,
+    /// Vector irradiance, texel by texel and in that coefficient by coefficient.
+    pub(crate) vector: Tiled,
+}
+
+/// Rows that are computed together.
+#[derive(Clone, Copy, Debug)]
+pub struct RowTile {
+    /// The first.
+    pub start: u16,
+    /// How many: [`TILE`], or [`HALF_TILE`].
+    pub height: u8,
+}
+
+/// Up to [`DOT_ROWS`] modes of one class, or that many of several.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Group {
+    /// How many.
+    pub count: u8,
+    /// Whether they are of several classes; else they have consecutive rows.
+    pub is_mixed: bool,
+    /// The class of each.
+    pub classes: [u8; DOT_ROWS],
+    /// The row of each.
+    pub rows: [u16; DOT_ROWS],
+    /// The scale of each.
+    pub scales: [f32; DOT_ROWS],
+}
+
+/// A matrix in tiles, all of whose columns are used.
+#[derive(Clone, Debug)]
+pub struct Tiled {
+    /// Rows before padding.
+    pub rows: usize,
+    pub(crate) values: Values,
+    pub(crate) columns: ColumnLists,
+    pub(crate) scales: Vec<f32>,
+}
+
+impl Tiled {
+    /// Packs a matrix with a column for each joint mode, of whose rows `row(k)` is number k.
+    fn new(
+        matrix: &Matrix<f32>,
+        row: impl Fn(usize) -> usize,
+        order: &RowOrder,
+        storage: Storage,
+    ) -> Self {
+        let rows = matrix.rows();
+        let scales = scales(matrix, storage);
+        let mut values = Values::new(storage);
+        for tile in (0..rows).step_by(TILE) {
+            for (j, &scale) in scales.iter().enumerate() {
+                for k in tile..tile + TILE {
+                    let value = if k < rows { matrix[(row(k), j)] } else { 0.0 };
+                    values.push(value, scale);
+                }
+            }
+        }
+        let mut lists = ColumnLists::default();
+        lists.push(order.row_of_mode.iter().map(|&row| u32::from(row)));
+        Self {
+            rows,
+            values,
+            columns: lists,
+            scales: order.scales_by_row(&scales, storage),
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        self.values.bytes() + size_of_val(self.scales.as_slice()) + self.columns.bytes()
+    }
+}
+
+/// The matrices that a shape is packed from.
+pub(crate) struct Operators<'a> {
+    /// `T_d->b`, modes x texels.
+    pub coefficients_from_direct: &'a Matrix<f32>,
+    /// Texels x joint modes.
+    pub joint_basis: &'a Matrix<f32>,
+    /// 9 probes³ x joint modes.
+    pub probe_basis: &'a Matrix<f32>,
+    /// 4 texels x joint modes, or no rows.
+    pub vector_basis: &'a Matrix<f32>,
+    /// By texel; empty if all are 1.
+    pub areas: &'a [f32],
+}
+
+impl PackedShape {
+    pub(crate) fn new(
+        shape: &Shape,
+        resolution: usize,
+        operators: &Operators<'_>,
+        storage: Storage,
+    ) -> Self {
+        let (t, j) = (operators.coefficients_from_direct, operators.joint_basis);
+        let (folding, classes) = Folding::new(shape, resolution, t, j, operators.areas);
+        let order = RowOrder::new(&folding, &classes.joint);
+        let scales = scales(j, storage);
+        let mut joint = Values::new(storage);
+        for tile in (0..folding.stride).step_by(TILE) {
+            for rows in &order.classes {
+                for &mode in &order.mode_of_row[rows.clone()] {
+                    let mode = usize::from(mode);
+                    for orbit in tile..tile + TILE {
+                        let value = folding.first(orbit).map_or(0.0, |texel| j[(texel, mode)]);
+                        joint.push(value, scales[mode]);
+                    }
+                }
+            }
+        }
+        let norm =
+            |values: &mut dyn Iterator<Item = f32>| values.map(|x| x * x).sum::<f32>().sqrt();
+        let joint_norms: Vec<f32> = (0..j.columns())
+            .map(|mode| norm(&mut j.column(mode).iter().copied()))
+            .collect();
+        let units: Vec<f32> = joint_norms.iter().map(|&n| power_of_two(n)).collect();
+        let inverse = |&mode: &u16| units.get(usize::from(mode)).map_or(0.0, |unit| 1.0 / unit);
+        let row_inverses = order.mode_of_row.iter().map(inverse).collect();
+        let peak = |&mode: &u16| {
+            let mode = usize::from(mode);
+            [j, operators.probe_basis, operators.vector_basis]
+                .into_iter()
+                .filter(|basis| mode < basis.columns())
+                .flat_map(|basis| basis.column(mode))
+                .fold(0.0f32, |m, x| m.max(x.abs()))
+        };
+        let peaks = order.mode_of_row.iter().map(peak).collect();
+        let area = folding.weight.iter().sum::<f32>() * folding.elements() as f32;
+        let coefficient_norms = (0..t.rows())
+            .map(|mode| norm(&mut (0..j.rows()).map(|texel| t[(mode, texel)])))
+            .collect();
+        let (from_direct, groups) = coefficient_rows(&folding, &classes, &order, t, storage);
+        let probes = operators.probe_basis.rows() / SH_COEFFICIENTS;
+        Self {
+            modes: t.rows(),
+            joint_modes: j.columns(),
+            rows: order.mode_of_row.len(),
+            from_direct,
+            groups,
+            joint,
+            joint_scales: order.scales_by_row(&scales, storage),
+            units,
+            row_inverses,
+            peaks,
+            area,
+            joint_norms,
+            coefficient_norms,
+            probes: Tiled::new(
+                operators.probe_basis,
+                |k| k % probes * SH_COEFFICIENTS + k / probes,
+                &order,
+                storage,
+            ),
+            vector: Tiled::new(operators.vector_basis, |k| k, &order, storage),
+            joint_classes: order.classes,
+            row_tiles: order.tiles,
+            row_of_mode: order.row_of_mode,
+            mode_of_row: order.mode_of_row,
+            folding,
+        }
+    }
+
+    /// The joint mode of each of these rows; `None` for padding.
+    pub(crate) fn modes_of(
+        &self,
+        rows: Range<usize>,
+    ) -> impl Iterator<Item = Option<usize>> + Clone {
+        let modes = self.mode_of_row[rows].iter();
+        modes.map(|&mode| (mode != u16::MAX).then_some(usize::from(mode)))
+    }
+
+    /// Bytes of all operators.
+    pub fn bytes(&self) -> usize {
+        self.stage_bytes().iter().sum::<usize>() + self.probes.bytes() + self.vector.bytes()
+    }
+
+    /// Bytes of `T_d->b` and of the joint basis.
+    pub fn stage_bytes(&self) -> [usize; 2] {
+        [
+            self.from_direct.bytes() + size_of_val(self.groups.as_slice()),
+            self.joint.bytes() + size_of_val(self.joint_scales.as_slice()),
+        ]
+    }
+
+    /// Multiply-adds of `T_d->b` and of the joint basis for one block, three channels, without padding.
+    pub fn multiply_adds(&self) -> [usize; 2] {
+        let orbits = self.folding.multiplicity.iter().filter(|&&m| m > 0.0);
+        let orbits = orbits.count();
+        [3 * orbits * self.modes, 3 * orbits * self.joint_modes]
+    }
+}
+
+/// Which row each joint mode has.
+struct RowOrder {
+    row_of_mode: Vec<u16>,
+    /// `u16::MAX` where rows are padding.
+    mode_of_row: Vec<u16>,
+    /// By class.
+    classes: Vec<Range<usize>>,
+    tiles: Vec<RowTile>,
+}
+
+impl RowOrder {
+    fn new(folding: &Folding, class_of_mode: &[u8]) -> Self {
+        let mut order = Self {
+            row_of_mode: vec![0; class_of_mode.len()],
+            mode_of_row: Vec::new(),
+            classes: vec![0..0; folding.elements()],
+            tiles: Vec::new(),
+        };
+        // Levels are flat more often than not: blocks on one floor share the mirror between floor and ceiling, so tiles
+        // are of modes that are even or odd under it.
+        let is_odd = |class: usize| folding.up_mirror.is_some_and(|k| class >> k & 1 == 1);
+        for odd in [false, true] {
+            for class in (0..folding.elements()).filter(|&class| is_odd(class) == odd) {
+                let first = order.mode_of_row.len();
+                let modes = (0u16..).zip(class_of_mode);
+                for (mode, _) in modes.filter(|&(_, &c)| usize::from(c) == class) {
+                    order.row_of_mode[usize::from(mode)] = order.mode_of_row.len() as u16;
+                    order.mode_of_row.push(mode);
+                }
+                order.classes[class] = first..order.mode_of_row.len();
+            }
+            let rows = order.mode_of_row.len().next_multiple_of(HALF_TILE);
+            order.mode_of_row.resize(rows, u16::MAX);
+            let mut start = order.tiles.last().map_or(0, RowTile::end);
+            while start < rows {
+                let height = TILE.min(rows - start);
+                order.tiles.push(RowTile {
+                    start: start as u16,
+                    height: height as u8,
+                });
+                start += height;
+            }
+        }
+        order
+    }
+
+    /// Scales of modes by row, 1 where rows are padding; none for numbers that need none.
+    fn scales_by_row(&self, scales: &[f32], storage: Storage) -> Vec<f32> {
+        if storage == Storage::F32 {
+            return Vec::new();
+        }
+        let scale = |&mode: &u16| scales.get(usize::from(mode)).copied().unwrap_or(1.0);
+        self.mode_of_row.iter().map(scale).collect()
+    }
+}
+
+impl RowTile {
+    /// Its rows.
+    pub(crate) fn rows(&self) -> Range<usize> {
+        usize::from(self.start)..self.end()
+    }
+
+    fn end(&self) -> usize {
+        usize::from(self.start) + usize::from(self.height)
+    }
+}
+
+/// Scale of each column.
+fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
+    (0..matrix.columns())
+        .map(|j| {
+            let largest = matrix.column(j).iter().fold(0.0f32, |m, x| m.max(x.abs()));
+            Values::scale(storage, largest)
+        })
+        .collect()
+}
+
+/// The largest power of two that is not above a number; 1 for what is no light.
+fn power_of_two(x: f32) -> f32 {
+    if x < 1e-30 {
+        return 1.0;
+    }
+    f32::from_bits(x.to_bits() & 0x7f80_0000)
+}
+
+/// SH coefficients of a probe.
+const SH_COEFFICIENTS: usize = crate::output::probes::PROBE_COEFFICIENTS;
+
+fn coefficient_rows(
+    folding: &Folding,
+    classes: &Classes,
+    order: &RowOrder,
+    t: &Matrix<f32>,
+    storage: Storage,
+) -> (Values, Vec<Group>) {
+    let rows = (0u16..).zip(&order.mode_of_row);
+    let own: Vec<(u16, usize)> = rows
+        .map(|(row, &mode)| (row, usize::from(mode)))
+        .filter(|&(_, mode)| mode < t.rows())
+        .collect();
+    let class = |mode: usize| classes.coefficients[mode];
+    let neighbours =
+        |a: &(u16, usize), b: &(u16, usize)| b.0 == a.0 + 1 && class(a.1) == class(b.1);
+    // Few rows of a class do better in company, though each then needs light of its own.
+    let mut lonely: Vec<(u16, usize)> = Vec::new();
+    let mut members: Vec<Vec<(u16, usize)>> = Vec::new();
+    for run in own.chunk_by(neighbours) {
+        let (full, rest) = run.split_at(run.len() / DOT_ROWS * DOT_ROWS);
+        members.extend(full.chunks(DOT_ROWS).map(<[_]>::to_vec));
+        if rest.len() > FEW_ROWS {
+            members.push(rest.to_vec());
+        } else {
+            lonely.extend(rest);
+        }
+    }
+    members.extend(lonely.chunks(DOT_ROWS).map(<[_]>::to_vec));
+    // Those of one class write some rows more than they have, so in ascending order, and before the mixed ones.
+    let are_mixed = |members: &[(u16, usize)]| {
+        let alike = |pair: &[(u16, usize)]| neighbours(&pair[0], &pair[1]);
+        !members.windows(2).all(alike)
+    };
+    members.sort_by_key(|members| (are_mixed(members), members[0].0));
+    let mut numbers = Values::new(storage);
+    let mut groups = Vec::new();
+    for members in members {
+        let is_mixed = are_mixed(&members);
+        let mut group = Group {
+            is_mixed,
+            ..Group::default()
+        };
+        // Mixed groups are always full: the last row again.
+        let count = if is_mixed { DOT_ROWS } else { members.len() };
+        group.count = count as u8;
+        for k in 0..count {
+            let (row, mode) = members[k.min(members.len() - 1)];
+            let value = |orbit: usize| {
+                let texel = folding.first(orbit)?;
+                Some(t[(mode, texel)] * folding.multiplicity[orbit])
+            };
+            let orbits = 0..folding.stride;
+            let largest = orbits
+                .clone()
+                .filter_map(value)
+                .fold(0.0f32, |m, x| m.max(x.abs()));
+            let scale = Values::scale(storage, largest);
+            for orbit in orbits {
+                numbers.push(value(orbit).unwrap_or(0.0), scale);
+            }
+            (group.rows[k], group.classes[k], group.scales[k]) = (row, class(mode), scale);
+        }
+        groups.push(group);
+    }
+    (numbers, groups)
+}
+
+/// Rows of one class that are too few for a group.
+const FEW_ROWS: usize = 2;

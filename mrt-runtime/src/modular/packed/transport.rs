@@ -1,0 +1,347 @@
+//! `T_b->r` by where light arrives, without what is zero or negligible.
+
+use super::{PackedShape, Values};
+use crate::modular::scene::Layout;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::simd::tiles::ColumnLists;
+use mrt_core::storage::Storage;
+use std::ops::Range;
+
+/// From the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are counted as frames keep them
+/// ([`Layout`](crate::modular::scene::Layout)).
+#[derive(Clone, Debug, Default)]
+pub struct PackedTransport {
+    /// By block: its tiles.
+    pub(crate) tiles_of_block: Vec<Range<u32>>,
+    pub(crate) tiles: Vec<TransportTile>,
+    pub(crate) entries: Vec<TransportEntry>,
+    /// Where coefficients stand among those of all blocks.
+    pub(crate) columns: ColumnLists,
+    /// One a column, for `int8` only.
+    pub(crate) column_scales: Vec<f32>,
+    pub(crate) values: Option<Values>,
+    /// By gate: the doors whose values multiply what passes it.
+    pub(crate) gates: Vec<Vec<u32>>,
+    /// Blocks that a block sends light to, itself not counted unless it does: those of block k are
+    /// `reached[reached_by[k]..reached_by[k + 1]]`.
+    pub(crate) reached_by: Vec<u32>,
+    pub(crate) reached: Vec<u32>,
+    dense_multiply_adds: usize,
+    multiply_adds: usize,
+}
+
+/// What arrives in one [`RowTile`](super::RowTile) of a block.
+#[derive(Clone, Debug)]
+pub struct TransportTile {
+    pub(crate) entries: Range<u32>,
+    /// How many of them pass gates; those come first.
+    pub(crate) gated: u32,
+    /// What sums are multiplied by.
+    pub(crate) scale: f32,
+    /// Rows.
+    height: u8,
+}
+
+/// What one block sends to a tile.
+#[derive(Clone, Debug)]
+pub struct TransportEntry {
+    pub(crate) source: u32,
+    /// Which of the gates it passes; `u32::MAX` if none.
+    pub(crate) gate: u32,
+    /// In the lists of columns.
+    pub(crate) columns: Range<u32>,
+    /// First number.
+    pub(crate) start: u32,
+}
+
+/// Makes a [`PackedTransport`], one pair of blocks after another.
+#[derive(Debug)]
+pub struct TransportPacker<'a> {
+    shapes: &'a [PackedShape],
+    /// By block, as frames count them: its shape.
+    shape_of_block: Vec<usize>,
+    /// From a block's coefficients to the next one's.
+    block_stride: u32,
+    storage: Storage,
+    negligible: Option<f32>,
+    pending: Vec<Pending>,
+    columns: Vec<u16>,
+    values: Vec<f32>,
+    gates: Vec<Vec<u32>>,
+    dense_multiply_adds: usize,
+}
+
+#[derive(Clone, Debug)]
+struct Pending {
+    target: u32,
+    tile: u32,
+    gate: u32,
+    source: u32,
+    columns: Range<usize>,
+    start: usize,
+}
+
+impl<'a> TransportPacker<'a> {
+    pub(crate) fn new(
+        shapes: &'a [PackedShape],
+        layout: &Layout,
+        storage: Storage,
+        negligible: Option<f32>,
+    ) -> Self {
+        Self {
+            shapes,
+            shape_of_block: layout.shapes.iter().map(|&shape| shape as usize).collect(),
+            block_stride: 3 * layout.rows as u32,
+            storage,
+            negligible,
+            pending: Vec::new(),
+            columns: Vec::new(),
+            values: Vec::new(),
+            gates: Vec::new(),
+            dense_multiply_adds: 0,
+        }
+    }
+
+    /// Bytes of what was added.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(self.values.as_slice()) + size_of_val(self.columns.as_slice())
+    }
+
+    /// Adds what `source` sends to `target` through these doors, joint modes x modes. No pair twice with the same doors.
+    ///
+    /// Columns of tiles are left out from the least on, up to a share `negligible` of the pair's light in L2, measured by
+    /// the light on the receiving walls of unit light on the sending ones.
+    pub(crate) fn add(
+        &mut self,
+        doors: &[u32],
+        target: usize,
+        source: usize,
+        operator: &Matrix<f32>,
+    ) {
+        let (to, from) = (
+            &self.shapes[self.shape_of_block[target]],
+            &self.shapes[self.shape_of_block[source]],
+        );
+        self.dense_multiply_adds += 3 * operator.rows() * operator.columns();
+        let gate = if doors.is_empty() {
+            u32::MAX
+        } else {
+            let known = self.gates.iter().position(|gate| gate == doors);
+            known.unwrap_or_else(|| {
+                self.gates.push(doors.to_vec());
+                self.gates.len() - 1
+            }) as u32
+        };
+        let columns = operator.columns();
+        // (energy, tile, column) of everything.
+        let mut parts: Vec<(f64, u32, u16)> = Vec::new();
+        for (tile, rows) in to.row_tiles.iter().enumerate() {
+            let modes = to.modes_of(rows.rows());
+            for column in 0..columns {
+                let size = |mode: usize| {
+                    f64::from(to.joint_norms[mode]) * f64::from(operator[(mode, column)])
+                };
+                let sizes = modes.clone().flatten().map(size);
+                let energy: f64 = sizes.map(|size| size * size).sum();
+                let light = f64::from(from.coefficient_norms[column]);
+                parts.push((energy * light * light, tile as u32, column as u16));
+            }
+        }
+        let total: f64 = parts.iter().map(|p| p.0).sum();
+        if total == 0.0 {
+            return;
+        }
+        parts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+        let share = self.negligible.unwrap_or_else(|| negligible(columns));
+        let share = f64::from(share).max(ROUNDING);
+        let mut left_out = 0.0;
+        let kept = parts
+            .iter()
+            .position(|part| {
+                left_out += part.0;
+                left_out > share * share * total
+            })
+            .unwrap_or(0);
+        let mut kept: Vec<(u32, u16)> = parts[kept..].iter().map(|p| (p.1, p.2)).collect();
+        kept.sort_unstable();
+        for part in kept.chunk_by(|a, b| a.0 == b.0) {
+            let tile = part[0].0;
+            let first_column = self.columns.len();
+            let start = self.values.len();
+            let modes = to.modes_of(to.row_tiles[tile as usize].rows());
+            for &(_, column) in part {
+                let column = usize::from(column);
+                self.columns.push(from.row_of_mode[column]);
+                let values = modes
+                    .clone()
+                    .map(|mode| mode.map_or(0.0, |mode| operator[(mode, column)] * to.units[mode]));
+                self.values.extend(values);
+            }
+            self.pending.push(Pending {
+                target: target as u32,
+                tile,
+                gate,
+                source: source as u32,
+                columns: first_column..self.columns.len(),
+                start,
+            });
+        }
+    }
+
+    /// Sorts everything by where it arrives.
+    pub(crate) fn finish(mut self) -> PackedTransport {
+        // What passes no gate comes last: `u32::MAX`.
+        self.pending
+            .sort_by_key(|p| (p.target, p.tile, p.gate, p.source));
+        let mut packed = PackedTransport {
+            dense_multiply_adds: self.dense_multiply_adds,
+            ..PackedTransport::default()
+        };
+        let mut values = Values::new(self.storage);
+        let mut next = 0;
+        for (target, &shape) in self.shape_of_block.iter().enumerate() {
+            let shape = &self.shapes[shape];
+            let first_tile = packed.tiles.len() as u32;
+            for (tile, rows) in shape.row_tiles.iter().enumerate() {
+                let height = usize::from(rows.height);
+                values.fill_line();
+                let first = next;
+                while next < self.pending.len()
+                    && (self.pending[next].target, self.pending[next].tile)
+                        == (target as u32, tile as u32)
+                {
+                    next += 1;
+                }
+                let entries = &self.pending[first..next];
+                let numbers = |p: &Pending| &self.values[p.start..][..p.columns.len() * height];
+                let largest = entries
+                    .iter()
+                    .flat_map(numbers)
+                    .fold(0.0f32, |m, x| m.max(x.abs()));
+                let scale = match self.storage {
+                    Storage::Int8 => 1.0,
+                    storage => Values::scale(storage, largest),
+                };
+                let first_entry = packed.entries.len() as u32;
+                for entry in entries {
+                    let start = values.len();
+                    for column in numbers(entry).chunks(height) {
+                        let scale = if self.storage == Storage::Int8 {
+                            let largest = column.iter().fold(0.0f32, |m, x| m.max(x.abs()));
+                            let scale = Values::scale(Storage::Int8, largest);
+                            packed.column_scales.push(scale);
+                            scale
+                        } else {
+                            scale
+                        };
+                        for &value in column {
+                            values.push(value, scale);
+                        }
+                        packed.multiply_adds += 3 * height;
+                    }
+                    let first = entry.source * self.block_stride;
+                    let columns = self.columns[entry.columns.clone()].iter();
+                    let columns = columns.map(|&column| first + u32::from(column));
+                    let columns = packed.columns.push(columns);
+                    packed.entries.push(TransportEntry {
+                        source: entry.source,
+                        gate: entry.gate,
+                        columns: columns.start as u32..columns.end as u32,
+                        start: start as u32,
+                    });
+                }
+                let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
+                if let Some(last) = entries[gated..].last() {
+                    // Kernels of 8 and 16 lanes take columns in pairs: a column of zeros makes the run of all that passes no
+                    // gate even.
+                    let columns: usize = entries[gated..].iter().map(|p| p.columns.len()).sum();
+                    if columns % 2 == 1 && self.storage != Storage::Int8 {
+                        let column = last.source * self.block_stride;
+                        let end = packed.columns.push([column]).end;
+                        packed
+                            .entries
+                            .last_mut()
+                            .expect("the last of these")
+                            .columns
+                            .end = end as u32;
+                        for _ in 0..height {
+                            values.push(0.0, 1.0);
+                        }
+                        packed.multiply_adds += 3 * height;
+                    }
+                }
+                packed.tiles.push(TransportTile {
+                    entries: first_entry..packed.entries.len() as u32,
+                    gated: gated as u32,
+                    scale,
+                    height: rows.height,
+                });
+            }
+            packed
+                .tiles_of_block
+                .push(first_tile..packed.tiles.len() as u32);
+        }
+        let mut pairs: Vec<(u32, u32)> =
+            self.pending.iter().map(|p| (p.source, p.target)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut at = 0;
+        for source in 0..self.shape_of_block.len() as u32 {
+            packed.reached_by.push(at as u32);
+            while at < pairs.len() && pairs[at].0 == source {
+                packed.reached.push(pairs[at].1);
+                at += 1;
+            }
+        }
+        packed.reached_by.push(at as u32);
+        packed.values = Some(values);
+        packed.gates = self.gates;
+        packed
+    }
+}
+
+/// What may be left out of the light of so many modes, if nothing else is asked for.
+fn negligible(modes: usize) -> f32 {
+    (0.02 * (32.0 / modes as f32).powi(2)).clamp(0.02, 0.15)
+}
+
+/// Share of a pair's light that is rounding: what mirrors make zero is this small.
+const ROUNDING: f64 = 1e-6;
+
+impl PackedTransport {
+    /// Bytes of operators and of what says where they stand.
+    pub fn bytes(&self) -> usize {
+        self.values.as_ref().map_or(0, Values::bytes)
+            + self.columns.bytes()
+            + size_of_val(self.column_scales.as_slice())
+            + size_of_val(self.tiles.as_slice())
+            + size_of_val(self.entries.as_slice())
+            + size_of_val(self.reached_by.as_slice())
+            + size_of_val(self.reached.as_slice())
+    }
+
+    /// Multiply-adds of one product, three channels: of what is kept, with padding, and of dense operators of all pairs.
+    pub fn multiply_adds(&self) -> [usize; 2] {
+        [self.multiply_adds, self.dense_multiply_adds]
+    }
+
+    /// The same of what is kept, where only some blocks have light: `is_lit[place]`, places as in
+    /// [`Layout::rank`](crate::modular::scene::Layout).
+    ///
+    /// # Panics
+    /// If there are fewer places than blocks.
+    pub fn multiply_adds_from(&self, is_lit: &[bool]) -> usize {
+        let of_tile = |tile: &TransportTile| {
+            let entries = &self.entries[tile.entries.start as usize..tile.entries.end as usize];
+            let lit = entries.iter().filter(|e| is_lit[e.source as usize]);
+            let columns: usize = lit.map(|entry| entry.columns.len()).sum();
+            3 * columns * usize::from(tile.height)
+        };
+        self.tiles.iter().map(of_tile).sum()
+    }
+
+    /// Blocks that a block sends light to.
+    pub(crate) fn reached(&self, block: usize) -> &[u32] {
+        &self.reached[self.reached_by[block] as usize..self.reached_by[block + 1] as usize]
+    }
+}

@@ -1,0 +1,272 @@
+//! Paths of light through openings, in a form that all of them share.
+//!
+//! A straight ray through a grid of cubes never uses two opposite headings. So after turning and mirroring, its
+//! first heading is +z, the first one that differs +x, and the third one +y: a path is a word over z, x and y. A
+//! dictionary stores one operator a word, and a level finds the word and the symmetry that
+//! leads back to it.
+//!
+//! The canonical emitter is the unit cube that light leaves through z = 1. The canonical receiver is the unit
+//! cube that light enters through z = 0, heading for +z.
+
+use crate::level::shape::{Hole, Outline};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+
+/// Longest word: openings crossed by a path of a table.
+pub const MAX_WORD: usize = 12;
+
+/// One crossing of a word.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Crossing {
+    /// Heading: +x, +y or +z.
+    pub heading: Face,
+    /// The hole that it passes; `None` for a missing face.
+    pub hole: Option<HoleIndex>,
+}
+
+/// Position in [`Hole::ALL`].
+pub type HoleIndex = u8;
+
+/// A canonical sequence of crossings, the first one with heading +z.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Word(Vec<Crossing>);
+
+impl Word {
+    /// The crossings, at least one.
+    pub fn crossings(&self) -> &[Crossing] {
+        &self.0
+    }
+
+    /// The word with one more crossing.
+    pub fn then(&self, crossing: Crossing) -> Word {
+        let mut crossings = self.0.clone();
+        crossings.push(crossing);
+        Word(crossings)
+    }
+
+    /// Heading of the last crossing.
+    pub fn last_heading(&self) -> Face {
+        self.0
+            .last()
+            .map_or(Face::PosZ, |crossing| crossing.heading)
+    }
+
+    /// True when some crossing has this heading.
+    pub fn uses(&self, heading: Face) -> bool {
+        self.0.iter().any(|crossing| crossing.heading == heading)
+    }
+
+    /// All words of up to `depth` crossings; those with a hole have exactly one, and up to `hole_depth`
+    /// crossings. Without `vertical` no path has heading +y.
+    pub fn all(depth: usize, hole_depth: usize, holes: &[Hole], vertical: bool) -> Vec<Word> {
+        let mut words = Vec::new();
+        let mut front = vec![Word::default()];
+        for length in 1..=depth.max(hole_depth) {
+            let mut next = Vec::new();
+            for word in &front {
+                let mut headings = vec![Face::PosZ];
+                if !word.0.is_empty() {
+                    headings.push(Face::PosX);
+                }
+                if vertical && word.uses(Face::PosX) {
+                    headings.push(Face::PosY);
+                }
+                for heading in headings {
+                    let has_hole = word.0.iter().any(|crossing| crossing.hole.is_some());
+                    let fits = if has_hole { hole_depth } else { depth };
+                    if length <= fits || (!has_hole && length <= hole_depth) {
+                        next.push(word.then(Crossing {
+                            heading,
+                            hole: None,
+                        }));
+                    }
+                    // Doors and windows stand in side faces, and their up is y.
+                    if !has_hole && length <= hole_depth && heading != Face::PosY {
+                        next.extend(holes.iter().map(|hole| {
+                            word.then(Crossing {
+                                heading,
+                                hole: Some(hole.index() as HoleIndex),
+                            })
+                        }));
+                    }
+                }
+            }
+            words.extend(next.iter().cloned());
+            front = next;
+        }
+        words.retain(|word| {
+            let has_hole = word.0.iter().any(|crossing| crossing.hole.is_some());
+            word.0.len() <= if has_hole { hole_depth } else { depth }
+        });
+        words
+    }
+
+    /// As text: a letter a crossing, followed by `d` for a door or `w` for a window.
+    pub fn name(&self) -> String {
+        let mut name = String::new();
+        for crossing in &self.0 {
+            name.push(['x', 'y', 'z'][crossing.heading.axis()]);
+            if let Some(hole) = crossing.hole {
+                name.push(HOLE_LETTERS[usize::from(hole)]);
+            }
+        }
+        name
+    }
+
+    /// The word of that name, if it is canonical.
+    pub fn from_name(name: &str) -> Option<Word> {
+        let mut word = Word::default();
+        for letter in name.chars() {
+            if let Some(hole) = HOLE_LETTERS.iter().position(|&l| l == letter) {
+                let last = word.0.last_mut()?;
+                if last.hole.is_some() {
+                    return None;
+                }
+                last.hole = Some(hole as HoleIndex);
+                continue;
+            }
+            let heading = match letter {
+                'z' => Face::PosZ,
+                'x' if !word.0.is_empty() => Face::PosX,
+                'y' if word.uses(Face::PosX) => Face::PosY,
+                _ => return None,
+            };
+            word.0.push(Crossing {
+                heading,
+                hole: None,
+            });
+        }
+        (1..=MAX_WORD).contains(&word.0.len()).then_some(word)
+    }
+
+    /// Cells, relative to the emitter's, that the path stands in after each crossing.
+    pub fn cells(&self) -> impl Iterator<Item = [i32; 3]> + '_ {
+        self.0.iter().scan([0; 3], |cell, crossing| {
+            cell[crossing.heading.axis()] += 1;
+            Some(*cell)
+        })
+    }
+}
+
+/// Letters of [`Hole::ALL`] in names of words.
+const HOLE_LETTERS: [char; 2] = ['d', 'w'];
+
+/// The hole index of an opening.
+pub fn hole_of(outline: Outline) -> Option<HoleIndex> {
+    match outline {
+        Outline::Whole | Outline::Disc => None,
+        Outline::Hole(hole) => Some(hole.index() as HoleIndex),
+    }
+}
+
+/// The rotation that takes the canonical heading +z to a heading through a shape's face: side headings keep +y
+/// up, and the other two turn it towards +z or -z.
+pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
+    let images = match heading {
+        Face::PosZ => [Face::PosX, Face::PosY, Face::PosZ],
+        Face::NegZ => [Face::NegX, Face::PosY, Face::NegZ],
+        Face::PosX => [Face::NegZ, Face::PosY, Face::PosX],
+        Face::NegX => [Face::PosZ, Face::PosY, Face::NegX],
+        Face::PosY => [Face::PosX, Face::NegZ, Face::PosY],
+        Face::NegY => [Face::PosX, Face::PosZ, Face::NegY],
+    };
+    CubeSymmetry::from_images(images[0], images[1], images[2]).unwrap_or(CubeSymmetry::IDENTITY)
+}
+
+/// How a frame stands to the one of [`frame_of_heading`] with the same heading: `frame = reference after
+/// exchange after mirrors`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Roll {
+    /// True when x and y are exchanged.
+    pub exchanged: bool,
+    /// Mirrors before that: bit 0 of x, bit 1 of y.
+    pub mirrors: u8,
+}
+
+impl Roll {
+    /// Of a frame whose z image is `heading`.
+    pub fn of(frame: CubeSymmetry) -> Roll {
+        let reference = frame_of_heading(frame.face(Face::PosZ));
+        let g = reference.inverse().after(frame);
+        let exchanged = g.face(Face::PosX).axis() == 1;
+        let mirrors = if exchanged {
+            CubeSymmetry::exchange(0, 1).after(g)
+        } else {
+            g
+        };
+        let flipped = |face: Face| u8::from(!mirrors.face(face).is_positive());
+        Roll {
+            exchanged,
+            mirrors: flipped(Face::PosX) | flipped(Face::PosY) << 1,
+        }
+    }
+
+    /// Sign that a mode of a parity (bit 0: odd in x, bit 1: odd in y) takes from the mirrors.
+    pub fn sign(self, parity: u8) -> f32 {
+        if (parity & self.mirrors).count_ones() % 2 == 1 {
+            -1.0
+        } else {
+            1.0
+        }
+    }
+}
+
+/// The canonical response's frame in the canonical path's: it is entered through the last heading.
+pub fn response_frame(word: &Word) -> CubeSymmetry {
+    CubeSymmetry::exchange(2, word.last_heading().axis())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_counted_as_restricted_growth_strings() {
+        let count = |depth, vertical| Word::all(depth, 0, &[], vertical).len();
+        assert_eq!(count(5, false), 1 + 2 + 4 + 8 + 16);
+        // 1, 2, 5, 14, 41: (3^d + 1) / 2.
+        assert_eq!(count(5, true), 1 + 2 + 5 + 14 + 41);
+        // One hole at each of the crossings.
+        assert_eq!(Word::all(0, 2, &[Hole::Door], false).len(), 1 + 2 * 2);
+    }
+
+    #[test]
+    fn names_lead_back_to_words() {
+        for word in Word::all(4, 3, &Hole::ALL, true) {
+            assert_eq!(Word::from_name(&word.name()), Some(word));
+        }
+        for name in ["", "x", "zy", "d", "zdd", "zq", "zzzzzzzzzzzzz"] {
+            assert_eq!(Word::from_name(name), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn frames_of_headings_are_rotations_and_keep_up() {
+        for heading in Face::ALL {
+            let frame = frame_of_heading(heading);
+            assert!(frame.is_rotation());
+            assert_eq!(frame.face(Face::PosZ), heading);
+            if heading.axis() != 1 {
+                assert_eq!(frame.face(Face::PosY), Face::PosY);
+            }
+        }
+    }
+
+    #[test]
+    fn a_roll_rebuilds_its_frame() {
+        for frame in CubeSymmetry::all() {
+            let roll = Roll::of(frame);
+            let mut g = CubeSymmetry::IDENTITY;
+            for axis in 0..2 {
+                if roll.mirrors >> axis & 1 == 1 {
+                    g = CubeSymmetry::mirror(axis).after(g);
+                }
+            }
+            if roll.exchanged {
+                g = CubeSymmetry::exchange(0, 1).after(g);
+            }
+            let reference = frame_of_heading(frame.face(Face::PosZ));
+            assert_eq!(reference.after(g), frame);
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Transport by lightfields that are passed on from opening to opening, as in the paper.
+//!
+//! Sequences that reach an opening with the same set of headings behind them are summed before they go on, since
+//! open rooms have binomially many.
+
+use super::transit::Transits;
+use super::{Arrivals, arrive, compose, with_door};
+use crate::modular::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
+use crate::modular::path::{Roll, frame_of_heading, hole_of};
+use crate::modular::scene::{Beyond, Scene};
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use std::collections::BTreeMap;
+
+/// Light of one source block about to enter a block.
+struct Wave {
+    /// Takes the entered block's canonical directions to the source's.
+    source_from_here: CubeRotation,
+    /// Lightfield modes x source modes, in `frame`.
+    lightfield: Matrix<f32>,
+}
+
+/// Which waves are summed.
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
+struct WaveKey {
+    block: usize,
+    entered: Face,
+    /// Headings used so far, as bits of [`Face::index`] in the source's frame.
+    headings: u8,
+    /// Takes the canonical interface to the source's directions; free of mirrors, so that what arrives by
+    /// mirrored ways is summed.
+    frame: CubeSymmetry,
+    /// Image of +x and +y of the entered block in the source's frame.
+    turn: [Face; 2],
+    /// Holes passed so far, two standing for more.
+    holes: usize,
+    doors: Vec<u32>,
+}
+
+type Front = BTreeMap<WaveKey, Wave>;
+
+/// The sum of all light of a block that enters others, but for paths of up to `covered` openings, which is by the
+/// number of holes on the way (two standing for more); `fields` are the dictionary's, decoded.
+pub(super) fn follow<M: OperatorMatrix>(
+    scene: &Scene,
+    dictionary: &Dictionary<M>,
+    fields: &LightfieldOperators,
+    (used_shapes, transits): (&[&ShapeOperators<M>], &Transits),
+    source: usize,
+    max_depth: usize,
+    covered: [usize; 3],
+) -> Arrivals {
+    let block = &scene.blocks[source];
+    let emission = &used_shapes[block.shape_index].openings;
+    let mut front = Front::new();
+    for (aperture, operators) in block.shape.openings.iter().zip(emission) {
+        let sent = Sent {
+            block: source,
+            exit: aperture.face,
+            source_from_here: CubeRotation::IDENTITY,
+            frame: frame_of_heading(aperture.face),
+            headings: 0,
+            holes: 0,
+            doors: &[],
+            lightfield: multiply(
+                fields.from_emission.view(),
+                operators.emission_from_coefficients[0].decode().view(),
+            ),
+        };
+        cross(&mut front, scene, fields, sent);
+    }
+    let mut arrivals = Arrivals::new();
+    for depth in 1..=max_depth {
+        let mut next = Front::new();
+        for (key, wave) in front {
+            if depth > covered[key.holes] {
+                let responses = multiply(
+                    fields.response_from_lightfield.view(),
+                    wave.lightfield.view(),
+                );
+                let target_frame =
+                    CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
+                arrive(
+                    &mut arrivals,
+                    &key.doors,
+                    (key.block, key.entered),
+                    target_frame,
+                    &dictionary.paths.response_parity,
+                    (&responses, 1.0),
+                );
+            }
+            if depth == max_depth {
+                continue;
+            }
+            for aperture in scene.blocks[key.block].shape.openings {
+                let heading = wave.source_from_here.face(aperture.face);
+                let turns_back = key.headings >> heading.opposite().index() & 1 == 1;
+                let here = &scene.blocks[key.block];
+                let leads_on = matches!(here.beyond[aperture.face.index()], Beyond::Block { .. });
+                if turns_back || !leads_on || aperture.face == key.entered {
+                    continue;
+                }
+                let (frame, mut lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+                let factor = transits.factor(here, key.entered, aperture.face);
+                if factor != 1.0 {
+                    lightfield.data_mut().iter_mut().for_each(|x| *x *= factor);
+                }
+                let sent = Sent {
+                    block: key.block,
+                    exit: aperture.face,
+                    source_from_here: wave.source_from_here,
+                    frame,
+                    headings: key.headings,
+                    holes: key.holes,
+                    doors: &key.doors,
+                    lightfield,
+                };
+                cross(&mut next, scene, fields, sent);
+            }
+        }
+        front = next;
+    }
+    arrivals
+}
+
+/// The lightfield at the opening of a cube towards `heading`, and its frame, from that at the opening entered.
+fn through(
+    fields: &LightfieldOperators,
+    frame: CubeSymmetry,
+    lightfield: &Matrix<f32>,
+    heading: Face,
+) -> (CubeSymmetry, Matrix<f32>) {
+    let mut frame = frame;
+    let mut lightfield = lightfield.clone();
+    let mut ahead = frame.inverse().face(heading);
+    if ahead == Face::PosZ {
+        return (frame, multiply(fields.straight.view(), lightfield.view()));
+    }
+    if ahead.axis() == 1 && fields.exchange.rows() > 0 {
+        frame = frame.after(CubeSymmetry::exchange(0, 1));
+        lightfield = multiply(fields.exchange.view(), lightfield.view());
+        ahead = frame.inverse().face(heading);
+    }
+    if ahead == Face::NegX {
+        frame = frame.after(CubeSymmetry::mirror(0));
+        change_signs(&mut lightfield, &fields.parity, |parity| parity & 1 == 1);
+    }
+    let frame = frame.after(frame_of_heading(Face::PosX));
+    (frame, multiply(fields.left.view(), lightfield.view()))
+}
+
+fn change_signs(lightfield: &mut Matrix<f32>, parity: &[u8], is_odd: impl Fn(u8) -> bool) {
+    let rows = lightfield.rows().max(1);
+    for column in lightfield.data_mut().chunks_exact_mut(rows) {
+        for (value, &parity) in column.iter_mut().zip(parity) {
+            if is_odd(parity) {
+                *value = -*value;
+            }
+        }
+    }
+}
+
+/// A lightfield at an opening of a block, on its way out.
+struct Sent<'a> {
+    block: usize,
+    exit: Face,
+    source_from_here: CubeRotation,
+    frame: CubeSymmetry,
+    headings: u8,
+    holes: usize,
+    doors: &'a [u32],
+    lightfield: Matrix<f32>,
+}
+
+/// Passes a lightfield into the block beyond, if there is one.
+fn cross(front: &mut Front, scene: &Scene, fields: &LightfieldOperators, sent: Sent) {
+    let here = &scene.blocks[sent.block];
+    let Beyond::Block {
+        block,
+        face: entered,
+        here_from_there,
+    } = here.beyond[sent.exit.index()]
+    else {
+        return;
+    };
+    let heading = sent.source_from_here.face(sent.exit);
+    let source_from_here = compose(sent.source_from_here, here_from_there);
+    let mut lightfield = sent.lightfield;
+    let roll = Roll::of(sent.frame);
+    change_signs(&mut lightfield, &fields.parity, |parity| {
+        roll.sign(parity) < 0.0
+    });
+    let mut frame = frame_of_heading(heading);
+    if roll.exchanged {
+        frame = frame.after(CubeSymmetry::exchange(0, 1));
+    }
+    let hole = here
+        .shape
+        .opening(sent.exit)
+        .and_then(|o| hole_of(o.outline));
+    if let Some(mask) = hole.and_then(|hole| fields.holes.get(usize::from(hole))) {
+        lightfield = multiply(mask.view(), lightfield.view());
+    }
+    let key = WaveKey {
+        block,
+        entered,
+        headings: sent.headings | 1 << heading.index(),
+        frame,
+        turn: [Face::PosX, Face::PosY].map(|face| source_from_here.face(face)),
+        holes: (sent.holes + usize::from(hole.is_some())).min(2),
+        doors: with_door(sent.doors, here.doors[sent.exit.index()]),
+    };
+    match front.get_mut(&key) {
+        Some(there) => {
+            for (sum, &x) in there
+                .lightfield
+                .data_mut()
+                .iter_mut()
+                .zip(lightfield.data())
+            {
+                *sum += x;
+            }
+        }
+        None => {
+            let wave = Wave {
+                source_from_here,
+                lightfield,
+            };
+            front.insert(key, wave);
+        }
+    }
+}

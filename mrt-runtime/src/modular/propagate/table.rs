@@ -1,0 +1,285 @@
+//! Transport by whole paths: a lookup and a sum for each sequence of openings.
+//!
+//! Every path from an opening is followed for as long as its word is in the dictionary. In an open room there are
+//! binomially many, which bounds the depth of a table rather than that of a level: adding one costs the additions
+//! of one small matrix.
+
+use super::transit::Transits;
+use super::{Arrivals, arrive, compose, with_door};
+use crate::modular::assemble::AssembleError;
+use crate::modular::dictionary::{Dictionary, OperatorMatrix, PathTable, ShapeOperators};
+use crate::modular::path::{
+    Crossing, MAX_WORD, Roll, Word, frame_of_heading, hole_of, response_frame,
+};
+use crate::modular::scene::{Beyond, Scene, SceneBlock};
+use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::matrix::{Matrix, multiply};
+use std::collections::HashMap;
+use std::rc::Rc;
+
+/// The operators of the paths that a scene has, brought to its sources.
+pub(super) struct Table<'a, M> {
+    scene: &'a Scene,
+    dictionary: &'a Dictionary<M>,
+    used_shapes: &'a [&'a ShapeOperators<M>],
+    transits: &'a Transits,
+    max_depth: usize,
+    /// Responses from coefficients.
+    cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
+}
+
+/// Shape, opening, word, and the frame's roll.
+type CacheKey = (usize, usize, usize, bool, u8);
+
+/// A path up to the block that it has just entered.
+#[derive(Clone)]
+struct Path {
+    word: Word,
+    block: usize,
+    /// The canonical face entered.
+    entered: Face,
+    /// Takes the entered block's canonical directions to the source's.
+    source_from_here: CubeRotation,
+    /// Headings of the word's x and y in the source's frame, as far as they are used.
+    x: Option<Face>,
+    y: Option<Face>,
+    doors: Vec<u32>,
+    /// Product of the transits so far.
+    factor: f32,
+}
+
+/// All paths from a block whose words are in a table.
+struct Walk<'a, M> {
+    blocks: &'a [SceneBlock],
+    paths: &'a PathTable<M>,
+    /// What warped blocks do to light on its way; `None` where only the words matter.
+    transits: Option<&'a Transits>,
+    max_depth: usize,
+    source: usize,
+    /// Position in the source shape's openings of the first one crossed.
+    opening: usize,
+}
+
+impl<M> Clone for Walk<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M> Copy for Walk<'_, M> {}
+
+impl<M> Walk<'_, M> {
+    /// Gives `visit` each path with its word's position in the table.
+    fn follow(self, visit: &mut impl FnMut(usize, &Path)) -> Result<(), AssembleError> {
+        let start = Path {
+            word: Word::default(),
+            block: self.source,
+            entered: self.first(),
+            source_from_here: CubeRotation::IDENTITY,
+            x: None,
+            y: None,
+            doors: Vec::new(),
+            factor: 1.0,
+        };
+        self.cross(self.first(), &start, visit)
+    }
+
+    /// The face of the source that paths leave by.
+    fn first(self) -> Face {
+        self.blocks[self.source].shape.openings[self.opening].face
+    }
+
+    /// Goes on through a face of the block that a path has reached.
+    fn cross(
+        self,
+        exit: Face,
+        path: &Path,
+        visit: &mut impl FnMut(usize, &Path),
+    ) -> Result<(), AssembleError> {
+        let here = &self.blocks[path.block];
+        let Beyond::Block {
+            block,
+            face: entered,
+            here_from_there,
+        } = here.beyond[exit.index()]
+        else {
+            return Ok(());
+        };
+        let first = self.first();
+        let heading = path.source_from_here.face(exit);
+        let (mut x, mut y) = (path.x, path.y);
+        let letter = if heading == first {
+            Face::PosZ
+        } else if x.is_none() || x == Some(heading) {
+            x = Some(heading);
+            Face::PosX
+        } else {
+            y = Some(heading);
+            Face::PosY
+        };
+        let hole = here.shape.opening(exit).and_then(|o| hole_of(o.outline));
+        let word = path.word.then(Crossing {
+            heading: letter,
+            hole,
+        });
+        let entries = &self.paths.entries;
+        let Ok(index) = entries.binary_search_by(|entry| entry.word.cmp(&word)) else {
+            return if self.paths.whole_table_has(&word) {
+                Err(AssembleError::MissingPath {
+                    block: self.source,
+                    face: self.blocks[self.source].orientation.face(first),
+                    word: word.name(),
+                })
+            } else {
+                Ok(())
+            };
+        };
+        let next = Path {
+            word,
+            block,
+            entered,
+            source_from_here: compose(path.source_from_here, here_from_there),
+            x,
+            y,
+            doors: with_door(&path.doors, here.doors[exit.index()]),
+            factor: path.factor,
+        };
+        visit(index, &next);
+        if next.word.crossings().len() >= self.max_depth {
+            return Ok(());
+        }
+        for aperture in self.blocks[block].shape.openings {
+            let heading = next.source_from_here.face(aperture.face);
+            let used = [Some(first), next.x, next.y];
+            if !used.contains(&Some(heading.opposite())) {
+                let there = &self.blocks[block];
+                let transit = self
+                    .transits
+                    .map_or(1.0, |t| t.factor(there, entered, aperture.face));
+                let onward = Path {
+                    factor: next.factor * transit,
+                    ..next.clone()
+                };
+                self.cross(aperture.face, &onward, visit)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which entries of a table the paths of a level have, whatever its depth.
+pub(crate) fn used_paths<M>(
+    blocks: &[SceneBlock],
+    paths: &PathTable<M>,
+) -> Result<Vec<bool>, AssembleError> {
+    let mut used = vec![false; paths.entries.len()];
+    for (source, block) in blocks.iter().enumerate() {
+        for opening in 0..block.shape.openings.len() {
+            let walk = Walk {
+                blocks,
+                paths,
+                transits: None,
+                max_depth: MAX_WORD,
+                source,
+                opening,
+            };
+            walk.follow(&mut |index, _| used[index] = true)?;
+        }
+    }
+    Ok(used)
+}
+
+impl<'a, M: OperatorMatrix> Table<'a, M> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        dictionary: &'a Dictionary<M>,
+        used_shapes: &'a [&'a ShapeOperators<M>],
+        transits: &'a Transits,
+        max_depth: usize,
+    ) -> Self {
+        Self {
+            scene,
+            dictionary,
+            used_shapes,
+            transits,
+            max_depth,
+            cache: HashMap::new(),
+        }
+    }
+
+    /// All light of a block that enters others.
+    pub(super) fn follow(&mut self, source: usize) -> Result<Arrivals, AssembleError> {
+        let mut arrivals = Arrivals::new();
+        let openings = self.scene.blocks[source].shape.openings;
+        for (opening, aperture) in openings.iter().enumerate() {
+            let walk = Walk {
+                blocks: &self.scene.blocks,
+                paths: &self.dictionary.paths,
+                transits: Some(self.transits),
+                max_depth: self.max_depth,
+                source,
+                opening,
+            };
+            walk.follow(&mut |index, path| {
+                let frame = path_frame(aperture.face, path.x, path.y);
+                let responses = self.responses(source, opening, index, frame);
+                let target_frame = CubeSymmetry::from(path.source_from_here.inverse())
+                    .after(frame)
+                    .after(response_frame(&path.word));
+                arrive(
+                    &mut arrivals,
+                    &path.doors,
+                    (path.block, path.entered),
+                    target_frame,
+                    &self.dictionary.paths.response_parity,
+                    (&responses, path.factor),
+                );
+            })?;
+        }
+        Ok(arrivals)
+    }
+
+    /// The path's operator times the emission of the source's shape in the path's frame.
+    fn responses(
+        &mut self,
+        source: usize,
+        opening: usize,
+        word: usize,
+        frame: CubeSymmetry,
+    ) -> Rc<Matrix<f32>> {
+        let shape = self.scene.blocks[source].shape_index;
+        let roll = Roll::of(frame);
+        let key = (shape, opening, word, roll.exchanged, roll.mirrors);
+        let (dictionary, used) = (self.dictionary, self.used_shapes[shape]);
+        self.cache
+            .entry(key)
+            .or_insert_with(|| {
+                let operators = &used.openings[opening];
+                let exchanged = usize::from(roll.exchanged);
+                // Without vertical openings every frame keeps up, and there is one.
+                let emission = operators
+                    .emission_from_coefficients
+                    .get(exchanged)
+                    .unwrap_or(&operators.emission_from_coefficients[0])
+                    .decode();
+                let parity = &dictionary.paths.emission_parity;
+                let mirrored = Matrix::from_fn(emission.rows(), emission.columns(), |i, j| {
+                    roll.sign(parity[i]) * emission[(i, j)]
+                });
+                let operator = &dictionary.paths.entries[word].response_from_emission;
+                let operator = operator.decode();
+                Rc::new(multiply(operator.view(), mirrored.view()))
+            })
+            .clone()
+    }
+}
+
+/// The path's canonical frame in the source's: headings that it does not use are those of the opening's frame.
+fn path_frame(first: Face, x: Option<Face>, y: Option<Face>) -> CubeSymmetry {
+    let reference = frame_of_heading(first);
+    let (side, up) = (reference.face(Face::PosX), reference.face(Face::PosY));
+    let x = x.unwrap_or(side);
+    let y = y.unwrap_or(if x.axis() == side.axis() { up } else { side });
+    CubeSymmetry::from_images(x, y, first).unwrap_or(reference)
+}

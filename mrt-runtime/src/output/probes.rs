@@ -1,0 +1,293 @@
+//! Probes: incident indirect light on a grid in every block, for things that move (Loos et al. 2011, section 6.5).
+//!
+//! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
+//! walls, so both show the same light. Between probes the light is interpolated, across openings too.
+
+use crate::modular::frame::{Expand, Scratch};
+use crate::modular::scene::{Beyond, Scene};
+use glam::{DMat3, DVec3, Vec3};
+use mrt_core::geometry::cube::Face;
+use mrt_core::lighting::sh;
+use mrt_core::simd::{Kernel, Lanes, SimdLevel};
+
+/// Coefficients of a probe: bands 0 to 2.
+pub const PROBE_COEFFICIENTS: usize = 9;
+
+/// How much of the light's directions probes keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum ProbeOrder {
+    /// Four coefficients: bands 0 and 1.
+    L1,
+    /// Nine: bands 0 to 2.
+    L2,
+}
+
+impl ProbeOrder {
+    /// Coefficients of a probe.
+    pub fn coefficients(self) -> usize {
+        match self {
+            ProbeOrder::L1 => 4,
+            ProbeOrder::L2 => 9,
+        }
+    }
+}
+
+/// Matrices that turn bands 1 and 2, row by row; band 0 stays.
+type BandRotations = [[f32; 5]; 3 + 5];
+
+fn band_rotations(rotation: &DMat3) -> BandRotations {
+    let bands = sh::rotation_matrices(3, rotation);
+    let mut rows = [[0.0; 5]; 8];
+    for (band, first) in [(1, 0), (2, 3)] {
+        for row in 0..2 * band + 1 {
+            for column in 0..2 * band + 1 {
+                rows[first + row][column] = bands[band][(row, column)] as f32;
+            }
+        }
+    }
+    rows
+}
+
+/// Turns all probes of a block: `to = bands * from`, both channel by channel, in that coefficient by coefficient.
+struct Turn<'a> {
+    bands: &'a BandRotations,
+    coefficients: usize,
+    count: usize,
+    from: &'a [f32],
+    to: &'a mut [f32],
+}
+
+impl Kernel for Turn<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self, l: L) {
+        let whole = self.count / L::N * L::N;
+        for channel in 0..3 {
+            let start = channel * self.coefficients * self.count;
+            let from = &self.from[start..start + self.coefficients * self.count];
+            let to = &mut self.to[start..start + self.coefficients * self.count];
+            to[..self.count].copy_from_slice(&from[..self.count]);
+            for row in 1..self.coefficients {
+                let (first, size) = if row < 4 { (1, 3) } else { (4, 5) };
+                let factors = &self.bands[row - 1][..size];
+                let mut probe = 0;
+                while probe < whole {
+                    let mut sum = l.splat(0.0);
+                    for (k, &factor) in factors.iter().enumerate() {
+                        let at = (first + k) * self.count + probe;
+                        sum = l.mul_add(l.splat(factor), l.load(&from[at..at + L::N]), sum);
+                    }
+                    let at = row * self.count + probe;
+                    l.store(&mut to[at..at + L::N], sum);
+                    probe += L::N;
+                }
+                for probe in whole..self.count {
+                    let mut sum = 0.0;
+                    for (k, &factor) in factors.iter().enumerate() {
+                        sum += factor * from[(first + k) * self.count + probe];
+                    }
+                    to[row * self.count + probe] = sum;
+                }
+            }
+        }
+    }
+}
+
+/// The probes of a scene after a frame.
+///
+/// Storage is block by block; in a block probe by probe, x fastest, then y, then z in the canonical cube at
+/// (i + 0.5) / n; in a probe coefficient by coefficient, RGB each.
+#[derive(Clone, Debug)]
+pub struct Probes {
+    order: ProbeOrder,
+    per_axis: usize,
+    values: Vec<[f32; 3]>,
+    /// Light of one block in its own axes, then in the world's: channel by channel, coefficient by coefficient.
+    scratch: Vec<f32>,
+    /// To world axes, by block.
+    rotations: Vec<BandRotations>,
+}
+
+impl Probes {
+    /// Dark probes for a scene, or `None` if its dictionary was baked without.
+    pub(crate) fn new(scene: &Scene, order: ProbeOrder) -> Option<Self> {
+        let count = scene.probes * scene.probes * scene.probes;
+        (count > 0).then(|| Self {
+            order,
+            per_axis: scene.probes,
+            values: vec![[0.0; 3]; scene.blocks.len() * count * order.coefficients()],
+            scratch: vec![0.0; 6 * count * order.coefficients()],
+            rotations: scene
+                .blocks
+                .iter()
+                .map(|block| band_rotations(&block.world_from_probe))
+                .collect(),
+        })
+    }
+
+    /// How many coefficients each probe has.
+    pub fn order(&self) -> ProbeOrder {
+        self.order
+    }
+
+    /// Probes along an edge of a block.
+    pub fn per_axis(&self) -> usize {
+        self.per_axis
+    }
+
+    /// Number of blocks that these are the probes of.
+    pub(crate) fn block_count(&self) -> usize {
+        self.rotations.len()
+    }
+
+    /// All coefficients, W/(m² sr) times the square root of steradian; see [`Probes`] for their order.
+    pub fn values(&self) -> &[[f32; 3]] {
+        &self.values
+    }
+
+    /// All coefficients as the bits of half-precision numbers, in the same order: what a texture takes.
+    ///
+    /// Values beyond 65,504 become that.
+    ///
+    /// # Panics
+    /// If `out` is not as long as [`Probes::values`].
+    pub fn write_f16(&self, out: &mut [[u16; 3]]) {
+        assert_eq!(out.len(), self.values.len(), "coefficients");
+        for (to, from) in out.iter_mut().zip(&self.values) {
+            *to = from.map(|x| {
+                let largest = f32::from(half::f16::MAX);
+                half::f16::from_f32(x.clamp(-largest, largest)).to_bits()
+            });
+        }
+    }
+
+    pub(crate) fn darken(&mut self) {
+        self.values.fill([0.0; 3]);
+    }
+
+    /// Dark, and turned as another scene's blocks are.
+    pub(crate) fn restart(&mut self, scene: &Scene) {
+        self.darken();
+        for (to, block) in self.rotations.iter_mut().zip(&scene.blocks) {
+            *to = band_rotations(&block.world_from_probe);
+        }
+    }
+
+    /// Expands the joint coefficients of one block, given by its place.
+    pub(crate) fn fill(
+        &mut self,
+        scene: &Scene,
+        place: usize,
+        level: SimdLevel,
+        joint: &[f32],
+        scratch: &mut Scratch,
+    ) {
+        let count = self.per_axis * self.per_axis * self.per_axis;
+        let kept = self.order.coefficients();
+        let block = scene.layout.order[place] as usize;
+        let (canonical, turned) = self.scratch.split_at_mut(3 * kept * count);
+        let (red, rest) = canonical.split_at_mut(kept * count);
+        let (green, blue) = rest.split_at_mut(kept * count);
+        level.run(Expand {
+            basis: &scene.shapes[scene.blocks[block].shape_index].probes,
+            rows: kept * count,
+            joint,
+            scratch,
+            out: [red, green, blue],
+        });
+        level.run(Turn {
+            bands: &self.rotations[block],
+            coefficients: kept,
+            count,
+            from: canonical,
+            to: turned,
+        });
+        let out = &mut self.values[block * count * kept..(block + 1) * count * kept];
+        for (probe, out) in out.chunks_exact_mut(kept).enumerate() {
+            for (k, out) in out.iter_mut().enumerate() {
+                for (channel, out) in out.iter_mut().enumerate() {
+                    *out = turned[(channel * kept + k) * count + probe];
+                }
+            }
+        }
+    }
+
+    /// Light at a point of the world: trilinear between the probes around it, those of joined blocks included;
+    /// `None` outside all blocks. Coefficients beyond the probes' order are zero. Doors count as open: half a probe's
+    /// spacing next to one, light is a mean of both sides.
+    pub fn at(&self, scene: &Scene, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
+        let block = scene.block_at(point, LOOKUP_TOLERANCE)?;
+        let unit = scene.blocks[block].warp.inverse(point)?;
+        let place = unit * self.per_axis as f64 - 0.5;
+        let low = place.floor();
+        let weight = place - low;
+        let mut sum = [[0.0f32; 3]; PROBE_COEFFICIENTS];
+        for corner in 0..8 {
+            let bits = DVec3::new(
+                f64::from(corner & 1),
+                f64::from(corner >> 1 & 1),
+                f64::from(corner >> 2 & 1),
+            );
+            let share = bits * weight + (DVec3::ONE - bits) * (DVec3::ONE - weight);
+            let share = share.element_product() as f32;
+            for (sum, value) in sum.iter_mut().zip(self.probe(scene, block, low + bits)) {
+                for (sum, x) in sum.iter_mut().zip(value) {
+                    *sum += share * x;
+                }
+            }
+        }
+        Some(sum)
+    }
+
+    /// A probe by its place in a block's grid, which may be one step outside: then it is the neighbour's
+    /// across an opening, and the nearest inside at a wall.
+    fn probe(&self, scene: &Scene, block: usize, place: DVec3) -> &[[f32; 3]] {
+        let n = self.per_axis as f64;
+        let mut block = block;
+        let mut point = (place + 0.5) / n;
+        for _ in 0..3 {
+            let outside = Face::ALL.into_iter().find(|face| {
+                let along = point[face.axis()];
+                if face.is_positive() {
+                    along > 1.0
+                } else {
+                    along < 0.0
+                }
+            });
+            let Some(face) = outside else { break };
+            match scene.blocks[block].beyond[face.index()] {
+                Beyond::Block {
+                    block: next,
+                    here_from_there,
+                    ..
+                } if scene.blocks[block].shape.is_open(face) => {
+                    point = here_from_there.inverse().point(point - face.outward());
+                    block = next;
+                }
+                _ => point[face.axis()] = point[face.axis()].clamp(0.5 / n, 1.0 - 0.5 / n),
+            }
+        }
+        let index = |x: f64| (x * n).floor().clamp(0.0, n - 1.0) as usize;
+        let (x, y, z) = (index(point.x), index(point.y), index(point.z));
+        let probe = (z * self.per_axis + y) * self.per_axis + x;
+        let count = self.per_axis * self.per_axis * self.per_axis;
+        let kept = self.order.coefficients();
+        &self.values[(block * count + probe) * kept..][..kept]
+    }
+}
+
+/// Points may lie outside blocks by this fraction of their size.
+const LOOKUP_TOLERANCE: f64 = 1e-4;
+
+/// Irradiance, W/m², on a surface of unit `normal` under a probe's light; what truncation leaves negative is zero.
+pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {
+    let channel = |c: usize| {
+        let mut radiance = [0.0f32; PROBE_COEFFICIENTS];
+        for (to, from) in radiance.iter_mut().zip(coefficients) {
+            *to = from[c];
+        }
+        sh::irradiance(&radiance, normal.as_dvec3()).max(0.0) as f32
+    };
+    Vec3::new(channel(0), channel(1), channel(2))
+}
