@@ -1,0 +1,435 @@
+//! What a game relies on every frame: no allocation, refused lights leave no trace, kinds of lights.
+
+use allocation_counter::measure;
+use glam::{DVec3, Vec3};
+use mrt_core::geometry::cube::Face;
+use mrt_runtime::level::block::{Door, Level};
+use mrt_runtime::light::placed::{Light, LightError};
+use mrt_runtime::light::visibility::{Openings, Rays};
+use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, MAX_LIGHTS};
+use mrt_runtime::modular::scene::Scene;
+use mrt_tests::{assembled, by_texel, floor_plan, solved, sphere};
+
+const CELLS: [[i32; 2]; 4] = [[0, 0], [1, 0], [2, 0], [1, 1]];
+
+fn level() -> Level {
+    floor_plan(&CELLS, 0.6)
+}
+
+/// Blocks 0 and 1 joined; the opening of block 1 towards block 2 leads outside.
+fn level_with_a_door_outside() -> Level {
+    let mut level = level();
+    level
+        .connections
+        .retain(|c| (c.a.block, c.b.block) != (1, 2));
+    level
+}
+
+const GOOD_SPHERE: Light = Light::Sphere {
+    position: Vec3::new(0.4, 0.5, 0.6),
+    radius: 0.1,
+    intensity: Vec3::new(1.0, 2.0, 3.0),
+};
+const GOOD_SPOT: Light = Light::Spot {
+    position: Vec3::new(1.5, 0.9, 0.5),
+    radius: 0.05,
+    intensity: Vec3::new(2.0, 1.0, 0.5),
+    direction: Vec3::new(0.2, -2.0, 0.1),
+    inner_angle: 0.4,
+    outer_angle: 0.9,
+};
+const GOOD_DIRECTIONAL: Light = Light::Directional {
+    direction: Vec3::new(-1.0, -0.3, 0.2),
+    irradiance: Vec3::new(5.0, 4.0, 3.0),
+};
+
+/// Everything that a frame shows, bit by bit.
+fn snapshot(frame: &Frame) -> Vec<u32> {
+    let signals = [frame.direct(), frame.indirect(), frame.coefficients()];
+    let lightmap = frame.lightmap().as_flattened().to_vec();
+    let all = signals.into_iter().chain([lightmap]).flatten();
+    all.map(|x| x.to_bits()).chain([frame.passes()]).collect()
+}
+
+#[test]
+fn a_frame_allocates_nothing() {
+    let scene = assembled(&level_with_a_door_outside());
+    let mut frame = Frame::new(&scene);
+    let lights = [GOOD_SPHERE, GOOD_SPOT, GOOD_DIRECTIONAL];
+    let mut refused = lights;
+    refused[2] = sphere(Vec3::new(50.0, 0.5, 0.5), 0.1, Vec3::ONE);
+    let converged = Bounces::Converged {
+        tolerance: 1e-3,
+        limit: 50,
+    };
+    for bounces in [
+        Bounces::Count(1),
+        Bounces::Count(4),
+        Bounces::Feedback,
+        converged,
+    ] {
+        // The very first frame included.
+        let counted = measure(|| {
+            for lights in [&lights[..], &lights[..1], &[], &lights[..]] {
+                let solved = frame.solve(&scene, lights, &Openings, bounces);
+                assert!(solved.is_ok());
+            }
+            let error = frame.solve(&scene, &refused, &Openings, bounces);
+            assert!(error.is_err());
+            let rays = Rays(|_: DVec3, _: DVec3| 0.5);
+            assert!(frame.solve(&scene, &lights, &rays, bounces).is_ok());
+        });
+        assert_eq!(counted.count_total, 0, "{bounces:?}");
+    }
+    // The counter works here.
+    assert!(measure(|| drop(std::hint::black_box(vec![1u8; 100]))).count_total > 0);
+}
+
+#[test]
+fn the_most_lights_fit_without_allocation_and_one_more_is_refused() {
+    let scene = assembled(&floor_plan(&[[0, 0]], 0.5));
+    let mut frame = Frame::new(&scene);
+    let lights = vec![GOOD_SPHERE; MAX_LIGHTS + 1];
+    let counted = measure(|| {
+        let most = frame.solve(&scene, &lights[..MAX_LIGHTS], &Openings, Bounces::Count(1));
+        assert_eq!(most, Ok(()));
+    });
+    assert_eq!(counted.count_total, 0);
+    let before = snapshot(&frame);
+    let error = frame.solve(&scene, &lights, &Openings, Bounces::Count(1));
+    assert_eq!(
+        error,
+        Err(FrameError::TooManyLights {
+            found: MAX_LIGHTS + 1
+        })
+    );
+    assert_eq!(snapshot(&frame), before);
+}
+
+const NOT_NUMBERS: [f32; 4] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2e9];
+const NEGATIVE: [f32; 2] = [-1.0, -1e-30];
+
+/// A light with one of its values replaced, for all values and all that they must not be.
+fn faulty_lights() -> Vec<(&'static str, Light)> {
+    let mut faulty = Vec::new();
+    let all = || NOT_NUMBERS.into_iter().chain(NEGATIVE);
+    for axis in 0..3 {
+        let with = |mut vector: Vec3, value: f32| {
+            vector[axis] = value;
+            vector
+        };
+        for bad in all() {
+            faulty.push((
+                "intensity",
+                sphere(Vec3::splat(0.5), 0.1, with(Vec3::ONE, bad)),
+            ));
+            faulty.push((
+                "irradiance",
+                Light::Directional {
+                    direction: Vec3::NEG_Y,
+                    irradiance: with(Vec3::ONE, bad),
+                },
+            ));
+        }
+        for bad in NOT_NUMBERS {
+            faulty.push((
+                "position",
+                sphere(with(Vec3::splat(0.5), bad), 0.1, Vec3::ONE),
+            ));
+            faulty.push((
+                "direction",
+                Light::Directional {
+                    direction: with(Vec3::NEG_Y, bad),
+                    irradiance: Vec3::ONE,
+                },
+            ));
+            faulty.push(("direction", spot(with(Vec3::NEG_Y, bad), 0.1, 0.2)));
+        }
+    }
+    for bad in all() {
+        faulty.push(("radius", sphere(Vec3::splat(0.5), bad, Vec3::ONE)));
+        faulty.push(("inner angle", spot(Vec3::NEG_Y, bad, 1.0)));
+        faulty.push(("outer angle", spot(Vec3::NEG_Y, 0.0, bad)));
+    }
+    faulty.push(("outer angle", spot(Vec3::NEG_Y, 0.0, 3.2)));
+    // Inner beyond outer.
+    faulty.push(("inner angle", spot(Vec3::NEG_Y, 1.0, 0.9)));
+    faulty
+}
+
+fn spot(direction: Vec3, inner_angle: f32, outer_angle: f32) -> Light {
+    Light::Spot {
+        position: Vec3::splat(0.5),
+        radius: 0.1,
+        intensity: Vec3::ONE,
+        direction,
+        inner_angle,
+        outer_angle,
+    }
+}
+
+#[test]
+fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
+    let scene = assembled(&level());
+    let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(3));
+    let before = snapshot(&frame);
+    let mut refuse = |light: Light| {
+        let error = frame
+            .solve(&scene, &[GOOD_SPHERE, light], &Openings, Bounces::Count(1))
+            .expect_err("the light is faulty");
+        assert_eq!(snapshot(&frame), before, "{light:?}");
+        let FrameError::Light(error) = error else {
+            panic!("{light:?}: {error}");
+        };
+        error
+    };
+    for (field, light) in faulty_lights() {
+        match refuse(light) {
+            LightError::OutOfRange { light: 1, what, .. } => assert_eq!(what, field, "{light:?}"),
+            other => panic!("{light:?}: {other}"),
+        }
+    }
+    for direction in [Vec3::ZERO, Vec3::new(0.0, -0.0, 0.0)] {
+        let directional = Light::Directional {
+            direction,
+            irradiance: Vec3::ONE,
+        };
+        for light in [directional, spot(direction, 0.1, 0.2)] {
+            let error = refuse(light);
+            assert!(
+                matches!(error, LightError::NoDirection { light: 1, .. }),
+                "{error}"
+            );
+        }
+    }
+    for position in [
+        Vec3::new(-0.01, 0.5, 0.5),
+        Vec3::new(0.5, 0.5, 1.5),
+        Vec3::splat(1e9),
+        Vec3::new(0.5, 1.001, 0.5),
+    ] {
+        let error = refuse(sphere(position, 0.1, Vec3::ONE));
+        assert!(
+            matches!(error, LightError::OutsideBlocks { light: 1, .. }),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn extreme_but_legal_lights_give_finite_light() {
+    let scene = assembled(&level_with_a_door_outside());
+    let mut lights = Vec::new();
+    for intensity in [0.0, f32::MIN_POSITIVE, 1e9] {
+        for radius in [0.0, f32::MIN_POSITIVE, 1e9] {
+            for position in [
+                Vec3::splat(0.5),
+                Vec3::ZERO,
+                scene.texel_position(17),
+                Vec3::new(1.0, 0.5, 0.5),
+            ] {
+                lights.push(sphere(position, radius, Vec3::splat(intensity)));
+            }
+        }
+    }
+    lights.push(spot(Vec3::splat(1e-38), 0.0, 0.0));
+    lights.push(spot(
+        Vec3::splat(1e9),
+        std::f32::consts::PI,
+        std::f32::consts::PI,
+    ));
+    for light in &lights {
+        let frame = solved(&scene, &[*light], Bounces::Count(8));
+        for signal in [frame.direct(), frame.indirect()] {
+            assert!(
+                signal.iter().all(|e| e.is_finite() && *e >= 0.0),
+                "{light:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn buffers_of_another_scene_are_refused() {
+    let scene = assembled(&level());
+    let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(1));
+    let before = snapshot(&frame);
+    let larger = assembled(&floor_plan(&[[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], 0.6));
+    // As many of everything, and a door that the frame has no value for.
+    let mut with_a_door = level();
+    with_a_door.doors.push(Door {
+        connection: 0,
+        value: 1.0,
+    });
+    let with_a_door = assembled(&with_a_door);
+    for other in [&larger, &with_a_door] {
+        let error = frame
+            .solve(other, &[GOOD_SPHERE], &Openings, Bounces::Count(1))
+            .expect_err("the buffers are too small or too large");
+        assert!(matches!(error, FrameError::OtherScene { .. }), "{error}");
+        assert_eq!(snapshot(&frame), before);
+    }
+}
+
+#[test]
+fn without_lights_everything_is_zero() {
+    let scene = assembled(&level());
+    let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(2));
+    for bounces in [
+        Bounces::Count(0),
+        Bounces::Count(3),
+        Bounces::Converged {
+            tolerance: 0.0,
+            limit: 5,
+        },
+    ] {
+        frame
+            .solve(&scene, &[], &Openings, bounces)
+            .expect("no lights are no fault");
+        let all = [
+            frame.direct(),
+            frame.indirect(),
+            frame.lightmap().as_flattened().to_vec(),
+        ];
+        assert!(all.into_iter().flatten().all(|e| e == 0.0), "{bounces:?}");
+    }
+}
+
+#[test]
+fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
+    let scene = assembled(&level());
+    let Light::Spot {
+        position,
+        radius,
+        intensity,
+        direction,
+        inner_angle,
+        outer_angle,
+    } = GOOD_SPOT
+    else {
+        panic!("it is a spot");
+    };
+    let spot = solved(&scene, &[GOOD_SPOT], Bounces::Count(1));
+    let sphere = solved(
+        &scene,
+        &[sphere(position, radius, intensity)],
+        Bounces::Count(1),
+    );
+    let (spot, sphere) = (
+        by_texel(&scene, &spot.direct()),
+        by_texel(&scene, &sphere.direct()),
+    );
+    let mut seen = [0; 3];
+    for texel in 0..scene.texel_count() {
+        let angle = (scene.texel_position(texel) - position).angle_between(direction);
+        // `angle_between` here is `f32`: off by up to 1e-3 for small angles.
+        if angle < inner_angle - 1e-3 {
+            assert_eq!(spot[texel], sphere[texel]);
+            seen[0] += 1;
+        } else if angle > outer_angle + 1e-3 {
+            assert_eq!(spot[texel], [0.0; 3]);
+            seen[1] += 1;
+        } else {
+            assert!((0..3).all(|c| spot[texel][c] <= sphere[texel][c]));
+            seen[2] += 1;
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 10), "{seen:?}");
+}
+
+#[test]
+fn directional_light_enters_through_outside_openings_only() {
+    let closed = assembled(&level());
+    let frame = solved(&closed, &[GOOD_DIRECTIONAL], Bounces::Count(2));
+    assert!(
+        frame
+            .direct()
+            .iter()
+            .chain(&frame.indirect())
+            .all(|&e| e == 0.0)
+    );
+
+    let open = assembled(&level_with_a_door_outside());
+    let frame = solved(&open, &[GOOD_DIRECTIONAL], Bounces::Count(1));
+    let direct = by_texel(&open, &frame.direct());
+    let flux = direct.iter().map(|e| f64::from(e[0])).sum::<f64>() / 256.0;
+    let direction = DVec3::new(-1.0, -0.3, 0.2).normalize();
+    // What passes the unit opening in the plane x = 2, all of which ends on walls of blocks 0, 1 and 3.
+    let expected = 5.0 * -direction.x;
+    // The light's edges cut through texels of 1/16: about half a texel along each of them.
+    assert!((flux / expected - 1.0).abs() < 0.05, "{flux} of {expected}");
+    // Block 2 opens to the other side: light that travels to -x does not enter through its face -x.
+    for texel in open.blocks[2].texels.clone() {
+        assert_eq!(direct[texel], [0.0; 3]);
+    }
+    check_against_rays(&open, direction, &direct);
+}
+
+/// Traces each texel back through the only door, at x = 2.
+fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
+    // Texels whose ray passes the door's rim this closely are left to rounding.
+    const RIM: f64 = 1e-6;
+    for block in [0, 1] {
+        for texel in scene.blocks[block].texels.clone() {
+            let position = scene.texel_position(texel).as_dvec3();
+            let normal = scene.texel_normal(texel).as_dvec3();
+            let distance = (2.0 - position.x) / -direction.x;
+            let door = position - direction * distance;
+            let depth = door.y.min(1.0 - door.y).min(door.z.min(1.0 - door.z));
+            if depth.abs() < RIM {
+                continue;
+            }
+            let cosine = -normal.dot(direction);
+            let lit = depth > 0.0 && cosine > 0.0;
+            // Block 0 sees the door through block 1, whose sides are open or in one plane with the door's.
+            let expected = if lit { 5.0 * cosine } else { 0.0 };
+            let found = f64::from(direct[texel][0]);
+            assert!(
+                (found - expected).abs() < 1e-5,
+                "block {block}: {found} {expected}"
+            );
+        }
+    }
+    assert!(scene.blocks[1].shape.is_open(Face::PosX));
+}
+
+#[test]
+fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
+    let level = Level::from_cells(&[[0, 0, 0]], Vec3::splat(0.5)).expect("one cell");
+    let scene = assembled(&level);
+    let mut frame = Frame::new(&scene);
+    let on_texel = Light::Spot {
+        position: scene.texel_position(0),
+        radius: 0.1,
+        intensity: Vec3::ONE,
+        direction: Vec3::ONE,
+        inner_angle: 0.5,
+        outer_angle: 1.5,
+    };
+    frame
+        .solve(&scene, &[on_texel], &Openings, Bounces::Count(1))
+        .expect("a light on a wall is inside");
+    assert!(frame.direct().iter().all(|e| e.is_finite()));
+    assert!(frame.indirect().iter().sum::<f32>() > 0.0);
+
+    let lamp = Light::Sphere {
+        position: Vec3::splat(0.5),
+        radius: 0.1,
+        intensity: Vec3::ONE,
+    };
+    let careless = Rays(|from: DVec3, _| if from.x > 0.5 { f32::NAN } else { 7.0 });
+    frame
+        .solve(&scene, &[lamp], &careless, Bounces::Count(1))
+        .expect("a sound light");
+    assert!(frame.direct().iter().all(|e| e.is_finite()));
+    assert!(frame.indirect().iter().sum::<f32>() > 0.0);
+
+    let wrong = vec![f32::NAN; frame.direct().len()];
+    assert!(matches!(
+        frame.solve_from_direct(&scene, &wrong, Bounces::Count(1)),
+        Err(FrameError::Direct {
+            faulty: Some(0),
+            ..
+        })
+    ));
+}

@@ -1,0 +1,6 @@
+//! Damaged, absurd and hostile input.
+
+mod dictionaries;
+mod files;
+mod levels;
+mod references;

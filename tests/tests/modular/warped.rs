@@ -1,0 +1,5 @@
+//! Warped blocks.
+
+mod bent;
+mod levels;
+mod transport;
