@@ -40,7 +40,11 @@ pub fn encode(picture: &Picture) -> Vec<u8> {
 /// Mantissas of red, green and blue, and their common exponent plus 128.
 fn rgbe(colour: Vec3) -> [u8; 4] {
     const LARGEST: f32 = (1u128 << 126) as f32;
-    let colour = colour.to_array().map(|x| x.max(0.0).min(LARGEST));
+    // NaN is not brighter than 0.
+    let colour = colour
+        .to_array()
+        .map(|x| x.max(0.0))
+        .map(|x| x.min(LARGEST));
     let brightest = colour.into_iter().fold(0.0, f32::max);
     if brightest < f32::MIN_POSITIVE {
         return [0; 4];
