@@ -1,4 +1,4 @@
-//! `mrt figures` as a user meets it: what needs no reference files is drawn anywhere, and what needs them
+//! `mrt-figures` as a user meets it: what needs no reference files is drawn anywhere, and what needs them
 //! says so.
 
 use mrt_dictionary::config::BakeConfig;
@@ -30,8 +30,8 @@ fn write_small_dictionary(folder: &Path) {
 
 /// Runs the program in `folder`, where no reference files are.
 fn figures(folder: &TempDir, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mrt"))
-        .args(["figures", "--dictionary", "small.mrt", "--resolution", "4"])
+    Command::new(env!("CARGO_BIN_EXE_mrt-figures"))
+        .args(["--dictionary", "small.mrt", "--resolution", "4"])
         .args(arguments)
         .current_dir(folder.path())
         .env("MRT_SHARED", folder.path())

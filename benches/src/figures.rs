@@ -1,24 +1,23 @@
-//! `mrt figures`: draws the pictures that explain the method, those of `docs/FIGURES.md`.
+//! `mrt-figures`: draws the pictures that explain the method, those of `docs/FIGURES.md`.
 
 mod basis;
-pub(crate) mod canvas;
 mod hops;
-pub(crate) mod plot;
+mod plot;
 mod probes;
 mod room;
 mod spectra;
 mod warps;
 mod white_face;
 
-use crate::cli::accuracy::AccuracyError;
-use crate::cli::dictionary_source::{SourceError, load};
-use crate::cli::table::Table;
-use crate::render::file::WriteError;
-use crate::render::level_view::ViewError;
-use canvas::Canvas;
+use crate::canvas::Canvas;
 use mrt_core::reference::oracle_file::ReferenceError;
 use mrt_core::reference::radiosity::ExactError;
 use mrt_dictionary::progress::Cancelled;
+use mrt_editor::cli::accuracy::AccuracyError;
+use mrt_editor::cli::dictionary_source::{SourceError, load};
+use mrt_editor::cli::table::Table;
+use mrt_editor::render::file::WriteError;
+use mrt_editor::render::level_view::ViewError;
 use mrt_runtime::level::text::LevelTextError;
 use mrt_runtime::modular::assemble::AssembleError;
 use mrt_runtime::modular::dictionary::Dictionary;
@@ -28,7 +27,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 /// Draws the pictures that explain the method: bases, spectra, errors, warps, colours and probes.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Parser)]
+#[command(name = "mrt-figures", version, max_term_width = 100)]
 pub struct FiguresArgs {
     /// Folder for the pictures.
     #[arg(long, default_value = "docs/pictures")]
@@ -250,10 +250,10 @@ pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
                 });
             }
             Err(error) if error.is_absence() && args.only.is_empty() => {
-                eprintln!("mrt: {name} is left out: {error}");
+                eprintln!("mrt-figures: {name} is left out: {error}");
             }
             Err(error) => {
-                eprintln!("mrt: {name}: {error}");
+                eprintln!("mrt-figures: {name}: {error}");
                 failed += 1;
             }
         }
@@ -263,7 +263,7 @@ pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
         figures,
     };
     if args.json {
-        crate::report_line!("{}", serde_json::to_string(&report)?);
+        mrt_editor::report_line!("{}", serde_json::to_string(&report)?);
     } else {
         print(&report);
     }
@@ -288,6 +288,6 @@ fn print(report: &FiguresReport) {
             format!("{:.1}", figure.seconds),
         ]);
     }
-    crate::report!("{table}");
-    crate::report_line!("dictionary: preset {}", report.preset);
+    mrt_editor::report!("{table}");
+    mrt_editor::report_line!("dictionary: preset {}", report.preset);
 }

@@ -1,7 +1,7 @@
 //! Charts as SVG and as PNG.
 
 use super::chart::{Mark, SIZE};
-use crate::cli::figures::canvas::{Canvas, Colour, Lettering, Side};
+use crate::canvas::{Canvas, Colour, Lettering, Side};
 use std::fmt::Write;
 
 /// A chart as the text of an SVG file.
@@ -105,7 +105,7 @@ pub fn canvas(marks: &[Mark]) -> Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::figures::canvas::INK;
+    use crate::canvas::INK;
 
     #[test]
     fn text_that_looks_like_markup_stays_text() {

@@ -1,8 +1,8 @@
 //! The first modes of the closed cube, unfolded (the paper's figure 2): implicit lights and the indirect light
 //! that they make.
 
-use super::canvas::{Area, Canvas, Lettering, RULE, Side, diverging};
 use super::{FigureError, Setting};
+use crate::canvas::{Area, Canvas, Lettering, RULE, Side, diverging};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_runtime::level::shape::SHAPES;

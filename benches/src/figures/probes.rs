@@ -1,13 +1,13 @@
 //! The demo's maze with a sphere at each probe of one layer, lit by the probe alone.
 
-use super::canvas::Canvas;
 use super::{FigureError, Setting};
-use crate::cli::demo::MAZE;
-use crate::render::camera::Camera;
-use crate::render::level_view::LevelView;
-use crate::render::render;
-use crate::render::tone::auto_exposure;
+use crate::canvas::Canvas;
 use glam::{DVec3, Vec3};
+use mrt_editor::cli::demo::MAZE;
+use mrt_editor::render::camera::Camera;
+use mrt_editor::render::level_view::LevelView;
+use mrt_editor::render::render;
+use mrt_editor::render::tone::auto_exposure;
 use mrt_runtime::level::text::from_text;
 use mrt_runtime::light::placed::Light;
 use mrt_runtime::light::visibility::Openings;

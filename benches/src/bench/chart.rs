@@ -1,8 +1,8 @@
 //! Run time against error, both logarithmic: what to draw and where, for any writer.
 
 use super::record::{Record, frontier};
-use crate::cli::figures::canvas::{Colour, FAINT_INK, INK, PAPER, RULE, SERIES, mix};
-use crate::cli::figures::canvas::{Lettering, Side};
+use crate::canvas::{Colour, FAINT_INK, INK, PAPER, RULE, SERIES, mix};
+use crate::canvas::{Lettering, Side};
 use std::collections::BTreeSet;
 
 /// Pixels across and down.

@@ -1,8 +1,6 @@
 //! One closed room: its reduced transport, its exact solution, and a picture of its inside.
 
 use super::FigureError;
-use crate::render::camera::Camera;
-use crate::render::{Picture, render};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
@@ -18,6 +16,8 @@ use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_boun
 use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
+use mrt_editor::render::camera::Camera;
+use mrt_editor::render::{Picture, render};
 use mrt_runtime::level::shape::SHAPES;
 use std::f32::consts::PI;
 

@@ -1,8 +1,8 @@
 //! How fast singular values fall (the paper's table 2, and what else is cut off).
 
-use super::canvas::{Area, Canvas, Colour, Lettering, PAPER, SERIES, Side};
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::{FigureError, Setting};
+use crate::canvas::{Area, Canvas, Colour, Lettering, PAPER, SERIES, Side};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_dictionary::modular::paths::emission::{emission_basis, emitter_radiosity};
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};

@@ -1,4 +1,4 @@
-//! `mrt bench` as a user meets it: lines of JSON, tables as files, plots, and refusals.
+//! `mrt-bench` as a user meets it: lines of JSON, tables as files, plots, and refusals.
 
 use serde_json::Value;
 use std::ffi::OsStr;
@@ -13,8 +13,7 @@ fn small_dictionary() -> PathBuf {
 
 /// Runs the program in `folder`.
 fn bench<S: AsRef<OsStr>>(folder: &TempDir, arguments: &[S]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mrt"))
-        .arg("bench")
+    Command::new(env!("CARGO_BIN_EXE_mrt-bench"))
         .args(arguments)
         .current_dir(folder.path())
         .output()

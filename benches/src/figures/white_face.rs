@@ -1,15 +1,15 @@
 //! A red box with one white wall (the paper's figure 13): whether bounced light keeps its colour.
 
-use super::canvas::{Canvas, Lettering, Side};
 use super::room::{ClosedCube, MODES, OpenBox, box_of, exact, radiance, reduced, spread};
 use super::{FigureError, Setting};
-use crate::render::camera::Camera;
-use crate::render::tone::auto_exposure;
+use crate::canvas::{Canvas, Lettering, Side};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::reference::radiosity::direct::PointLight;
 use mrt_core::reference::radiosity::{ExactScene, Side as Beyond};
 use mrt_dictionary::config::PriorConfig;
+use mrt_editor::render::camera::Camera;
+use mrt_editor::render::tone::auto_exposure;
 
 const RED: [f64; 3] = [0.6, 0.05, 0.05];
 const WHITE: [f64; 3] = [0.8; 3];

@@ -1,12 +1,10 @@
 //! Warped blocks: error against stretch, and a long hall (the paper's figure 12), by the three levels of
 //! transport that a block may have.
 
-use super::canvas::{Area, Canvas, Lettering, SERIES, Side};
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::room::{ClosedCube, MODES, OpenBox, box_of, exact, radiance, reduced, spread};
 use super::{FigureError, Setting};
-use crate::render::camera::Camera;
-use crate::render::tone::auto_exposure;
+use crate::canvas::{Area, Canvas, Lettering, SERIES, Side};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sampling::hash;
@@ -18,6 +16,8 @@ use mrt_dictionary::modular::light_prior::warped::{
 };
 use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
 use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
+use mrt_editor::render::camera::Camera;
+use mrt_editor::render::tone::auto_exposure;
 
 const LEVELS: [&str; 3] = [
     "canonical operators as they are",

@@ -1,7 +1,7 @@
 //! What was measured, as lines of JSON, as CSV and as tables.
 
 use super::machine::Machine;
-use crate::cli::table::Table;
+use mrt_editor::cli::table::Table;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;

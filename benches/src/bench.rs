@@ -1,4 +1,4 @@
-//! `mrt bench`: run time against error, for the frame in many settings and for other ways to the same light.
+//! `mrt-bench`: run time against error, for the frame in many settings and for other ways to the same light.
 
 mod chart;
 mod dense;
@@ -17,11 +17,6 @@ mod setting;
 mod timing;
 mod vpl;
 
-use crate::cli::accuracy::CouplingArg;
-use crate::cli::dictionary_source::{
-    DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
-};
-use crate::render::file::WriteError;
 use goals::{Goal, Mazes, Presets};
 use machine::Machine;
 use measure::{Baseline, Bench, MeasureError};
@@ -29,6 +24,11 @@ use mrt_core::container::write_file_atomically;
 use mrt_core::simd::SimdLevel;
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::progress::{Cancelled, Progress};
+use mrt_editor::cli::accuracy::CouplingArg;
+use mrt_editor::cli::dictionary_source::{
+    DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
+};
+use mrt_editor::render::file::WriteError;
 use mrt_runtime::level::block::MAX_BLOCKS;
 use mrt_runtime::modular::assemble::Coupling;
 use mrt_runtime::modular::dictionary::Dictionary;
@@ -43,7 +43,8 @@ use std::time::Duration;
 /// Measures run time and error of the frame, of the paper's dense products, and of other methods, on mazes.
 ///
 /// From the first of each list, one setting is changed at a time; --product takes all combinations.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Parser)]
+#[command(name = "mrt-bench", version, max_term_width = 100)]
 pub struct BenchArgs {
     /// Folder for tables, plots and exact solutions, which are kept for the next run.
     #[arg(long, default_value = "bench")]
@@ -213,7 +214,7 @@ pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
     }
     if args.json {
         for record in &records {
-            crate::report_line!("{}", serde_json::to_string(record)?);
+            mrt_editor::report_line!("{}", serde_json::to_string(record)?);
         }
     } else {
         print(&records, &machine);
@@ -241,12 +242,12 @@ fn report_goals(args: &BenchArgs, goals: &[Goal]) -> Result<(), BenchError> {
     write_file_atomically(&path, goals::csv(goals).as_bytes()).map_err(WriteError::File)?;
     if args.json {
         for goal in goals {
-            crate::report_line!("{}", serde_json::to_string(goal)?);
+            mrt_editor::report_line!("{}", serde_json::to_string(goal)?);
         }
     } else {
-        crate::report!("{}", goals::table(goals));
-        crate::report_line!();
-        crate::report!("{}", goals::stages(goals));
+        mrt_editor::report!("{}", goals::table(goals));
+        mrt_editor::report_line!();
+        mrt_editor::report!("{}", goals::stages(goals));
     }
     Ok(())
 }
@@ -274,7 +275,7 @@ fn dictionaries(args: &BenchArgs) -> Result<Vec<Named>, BenchError> {
         BakeConfig::preset(preset)?;
     }
     let sweep = sweep(args)?;
-    let set = crate::cli::dictionary_source::DEFAULT_SET;
+    let set = mrt_editor::cli::dictionary_source::DEFAULT_SET;
     for file in &args.dictionary {
         let dictionary = from_file(file)?;
         add(dictionary.preset.replace('/', "-"), dictionary);
@@ -353,7 +354,7 @@ fn measure_all(
             let variants = variants(args, named);
             let (found, baseline) = match bench.reduced(&setting, &reference, &variants) {
                 Err(MeasureError::Ours { case, source }) if source.is_size() => {
-                    eprintln!("mrt: {case} is left out: {source}");
+                    eprintln!("mrt-bench: {case} is left out: {source}");
                     continue;
                 }
                 other => other?,
@@ -455,16 +456,16 @@ fn remarks(level: &str, view: chart::View, records: &[Record], machine: &Machine
 }
 
 fn print(records: &[Record], machine: &Machine) {
-    crate::report!("{}", record::overview(records));
-    crate::report_line!();
+    mrt_editor::report!("{}", record::overview(records));
+    mrt_editor::report_line!();
     for sentence in record::rays_at_equal_time(records) {
-        crate::report_line!("{sentence}");
+        mrt_editor::report_line!("{sentence}");
     }
-    crate::report_line!();
-    crate::report!("{}", record::stages(records));
-    crate::report_line!();
+    mrt_editor::report_line!();
+    mrt_editor::report!("{}", record::stages(records));
+    mrt_editor::report_line!();
     for (level, gflops) in &machine.gflops {
-        crate::report_line!(
+        mrt_editor::report_line!(
             "one core, {}: {} GFLOP/s",
             level.name(),
             significant(*gflops)
@@ -472,6 +473,6 @@ fn print(records: &[Record], machine: &Machine) {
     }
     for (bytes, rate) in &machine.reads {
         let (bytes, rate) = (significant(*bytes as f64 / 1e6), significant(*rate));
-        crate::report_line!("one core, reading {bytes} MB again and again: {rate} GB/s");
+        mrt_editor::report_line!("one core, reading {bytes} MB again and again: {rate} GB/s");
     }
 }

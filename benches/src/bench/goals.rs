@@ -9,8 +9,8 @@ use super::record::{quoted, significant};
 use super::reference::Reference;
 use super::setting::Setting;
 use super::timing::{Timed, Times, in_turns};
-use crate::cli::table::Table;
 use mrt_core::simd::SimdLevel;
+use mrt_editor::cli::table::Table;
 use mrt_runtime::modular::assemble::Coupling;
 use mrt_runtime::modular::dictionary::Dictionary;
 use serde::Serialize;
@@ -225,7 +225,7 @@ impl Bench<'_> {
         ] {
             if !fast.is_available() {
                 eprintln!(
-                    "mrt: {} / {} is left out: this machine has no {}",
+                    "mrt-bench: {} / {} is left out: this machine has no {}",
                     slow.name(),
                     fast.name(),
                     fast.name()
@@ -289,7 +289,7 @@ impl Bench<'_> {
                 goals.push(Goal { detail, ..goal });
             }
         } else {
-            eprintln!("mrt: two threads are left out: this machine has one core");
+            eprintln!("mrt-bench: two threads are left out: this machine has one core");
         }
 
         let islands = large / LIGHTS_TOGETHER;
@@ -343,7 +343,7 @@ impl Bench<'_> {
             Some(dictionary) => Some(new(lit, &fastest("high", dictionary))?),
             None => {
                 eprintln!(
-                    "mrt: high / paper is left out: no dictionary of that preset (--dictionary FILE, or --presets \
+                    "mrt-bench: high / paper is left out: no dictionary of that preset (--dictionary FILE, or --presets \
                      high)"
                 );
                 None

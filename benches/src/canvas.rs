@@ -1,8 +1,5 @@
 //! A page to draw figures on: text, lines and patches of colour in 8-bit sRGB.
 
-use crate::render::Picture;
-use crate::render::file::WriteError;
-use crate::render::tone::tone_map;
 use embedded_graphics::Drawable;
 use embedded_graphics::Pixel;
 use embedded_graphics::geometry::{OriginDimensions, Point, Size};
@@ -16,6 +13,9 @@ use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use mrt_core::container::write_file_atomically;
+use mrt_editor::render::Picture;
+use mrt_editor::render::file::WriteError;
+use mrt_editor::render::tone::tone_map;
 use std::convert::Infallible;
 use std::path::Path;
 

@@ -8,12 +8,12 @@ use super::ours::Ours;
 use super::reference::Receiver;
 use super::setting::{ALBEDO, Setting};
 use super::timing::Timed;
-use crate::cli::reference_level::exact_scene;
 use mrt_core::lighting::sampling::hash;
 use mrt_core::linalg::matrix::{Matrix, MatrixView, dot, multiply};
 use mrt_core::linalg::svd::symmetric_eigen;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene};
+use mrt_editor::cli::reference_level::exact_scene;
 use std::f64::consts::TAU;
 use std::time::Instant;
 

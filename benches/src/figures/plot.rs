@@ -1,6 +1,6 @@
 //! Plots: axes with units, lines through points, a legend.
 
-use super::canvas::{Area, Canvas, Colour, INK, Lettering, PAPER, RULE, Side};
+use crate::canvas::{Area, Canvas, Colour, INK, Lettering, PAPER, RULE, Side};
 
 /// How values become places along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

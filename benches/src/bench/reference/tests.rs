@@ -1,7 +1,7 @@
 use super::super::ours::{Ours, Packing, Variant};
 use super::*;
-use crate::cli::dictionary_source::from_file;
 use mrt_core::simd::SimdLevel;
+use mrt_editor::cli::dictionary_source::from_file;
 use mrt_runtime::modular::assemble::Coupling;
 use mrt_runtime::modular::dictionary::Dictionary;
 

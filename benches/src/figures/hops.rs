@@ -1,12 +1,12 @@
 //! Error against distance: how far light may go before either coupling loses it.
 
-use super::canvas::{Area, Canvas, Colour, Lettering, SERIES, Side};
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::{FigureError, Setting};
-use crate::cli::accuracy::{AccuracyArgs, BouncesArg, CouplingArg, LightAccuracy, compare};
-use crate::cli::dictionary_source::load;
+use crate::canvas::{Area, Canvas, Colour, Lettering, SERIES, Side};
 use mrt_core::reference::error_measure::HOP_GROUPS;
 use mrt_core::reference::oracle_file::{ReferenceFile, oracle_folder, read};
+use mrt_editor::cli::accuracy::{AccuracyArgs, BouncesArg, CouplingArg, LightAccuracy, compare};
+use mrt_editor::cli::dictionary_source::load;
 use mrt_runtime::modular::assemble::AssembleConfig;
 use mrt_runtime::modular::dictionary::Dictionary;
 use std::borrow::Cow;
