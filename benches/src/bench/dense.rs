@@ -60,7 +60,7 @@ impl Dense {
     /// # Errors
     /// [`DenseError::Exact`].
     pub fn new(setting: &Setting, ours: &Ours) -> Result<Self, DenseError> {
-        let resolution = ours.scene.resolution;
+        let resolution = ours.scene.level.resolution;
         let exact = exact_scene(&setting.level, resolution)?;
         let transport = Transport::build(&exact);
         let count = exact.texel_count();
@@ -68,7 +68,7 @@ impl Dense {
         let mut radiosity = Matrix::zeros(count, 3);
         let direct = ours.direct();
         for wall in exact.walls() {
-            let range = &ours.scene.blocks[wall.block].texels;
+            let range = &ours.scene.level.blocks[wall.block].texels;
             for k in 0..resolution * resolution {
                 let (row, column) = (k / resolution, k % resolution);
                 let at = ours.scene.level_texel(wall.block, wall.face, row, column);

@@ -6,12 +6,11 @@ use super::timing::Timed;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
 use mrt_runtime::executor::{Executor, Rayon, Serial};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, FrameError};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::shadows::Openings;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, FrameConfig, FrameError,
+    Light, Scene,
+};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::Arc;
 
@@ -191,7 +190,7 @@ impl Ours {
             transport_storage,
             ..assemble_config(variant.coupling)
         };
-        let scene = assemble(&setting.level, variant.dictionary, &config)?;
+        let scene = Scene::assemble(&setting.level, variant.dictionary, &config)?;
         let pool = match variant.threads {
             0 | 1 => None,
             threads => {
@@ -231,7 +230,7 @@ impl Ours {
     /// # Errors
     /// [`OursError::Frame`].
     pub fn with_tolerance(mut self, share: f32) -> Result<Self, OursError> {
-        let brightest = self.frame.indirect().into_iter().fold(0.0, f32::max);
+        let brightest = self.indirect(&frame).into_iter().fold(0.0, f32::max);
         let config = FrameConfig {
             tolerance: share * brightest,
             ..self.config.clone()
@@ -259,7 +258,7 @@ impl Ours {
 
     /// The largest difference of a texel's indirect irradiance from another frame's of the same level.
     pub fn largest_difference(&self, other: &Self) -> f64 {
-        let (a, b) = (self.frame.indirect(), other.frame.indirect());
+        let (a, b) = (self.indirect(&frame), other.indirect(&frame));
         let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
         f64::from(apart.fold(0.0, f32::max))
     }
@@ -369,9 +368,9 @@ impl Ours {
     /// By place: whether there are direct light, coefficients b and indirect light.
     fn lit(&self) -> [Vec<bool>; 3] {
         let frame = &self.frame;
-        let signals = [frame.direct(), frame.coefficients(), frame.indirect()];
-        let mut lit = [(); 3].map(|()| vec![false; self.scene.blocks.len()]);
-        for (block, &place) in self.scene.blocks.iter().zip(&self.scene.layout.rank) {
+        let signals = [frame.direct(), frame.coefficients(), indirect(&frame)];
+        let mut lit = [(); 3].map(|()| vec![false; self.scene.level.blocks.len()]);
+        for (block, &place) in self.scene.level.blocks.iter().zip(&self.scene.layout.rank) {
             let ranges = [&block.texels, &block.coefficients, &block.texels];
             for ((lit, signal), range) in lit.iter_mut().zip(&signals).zip(ranges) {
                 let values = &signal[3 * range.start..3 * range.end];

@@ -10,10 +10,9 @@ use super::reference::Receiver;
 use super::setting::Setting;
 use super::timing::Timed;
 use mrt_core::linalg::matrix::{Matrix, MatrixView, multiply, multiply_add};
-use mrt_runtime::modular::assemble::{AssembleError, Coupling};
-use mrt_runtime::modular::dictionary::{Dictionary, ShapeOperators};
-use mrt_runtime::modular::opening_responses::{OpeningResponses, responses_by_opening};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
+use mrt_runtime::low_level::modular::opening_responses::{OpeningResponses, responses_by_opening};
+use mrt_runtime::{AssembleError, Coupling, Dictionary, Scene};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -105,7 +104,7 @@ impl Paper {
             .collect();
         let kept = strongest_modes(scene, &bases, &all, dictionary.response_modes());
         let mut groups = groups(scene, dictionary, &ours.direct(), &bases, &kept);
-        let mut place = vec![(0, 0); scene.blocks.len()];
+        let mut place = vec![(0, 0); scene.level.blocks.len()];
         for (g, group) in groups.iter().enumerate() {
             for (k, &block) in group.blocks.iter().enumerate() {
                 place[block] = (g, k);
@@ -266,7 +265,7 @@ fn operators<'a>(
     dictionary: &'a Dictionary,
     shape: usize,
 ) -> Option<&'a ShapeOperators> {
-    let block = scene.blocks.iter().find(|b| b.shape_index == shape)?;
+    let block = scene.level.blocks.iter().find(|b| b.shape_index == shape)?;
     dictionary
         .shape_index(block.shape)
         .map(|k| &dictionary.shapes[k])
@@ -294,14 +293,19 @@ fn strongest_modes(
     let square = |x: &f32| f64::from(*x) * f64::from(*x);
     let mut energy = vec![0.0; count];
     for arrival in all {
-        let basis = &bases[scene.blocks[arrival.target].shape_index][arrival.opening];
+        let basis = &bases[scene.level.blocks[arrival.target].shape_index][arrival.opening];
         for (mode, energy) in energy.iter_mut().enumerate() {
             let columns = arrival.responses.columns();
             let row = (0..columns).map(|j| square(&arrival.responses[(mode, j)]));
             *energy += row.sum::<f64>() * basis.column(mode).iter().map(square).sum::<f64>();
         }
     }
-    let modes = scene.blocks.iter().map(|b| b.coefficients.len()).max();
+    let modes = scene
+        .level
+        .blocks
+        .iter()
+        .map(|b| b.coefficients.len())
+        .max();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
     order.truncate(modes.unwrap_or(count));
@@ -318,15 +322,15 @@ fn groups(
 ) -> Vec<Group> {
     let group = |shape: usize| {
         let operators = operators(scene, dictionary, shape)?;
-        let of_shape = |&block: &usize| scene.blocks[block].shape_index == shape;
-        let blocks: Vec<usize> = (0..scene.blocks.len()).filter(of_shape).collect();
+        let of_shape = |&block: &usize| scene.level.blocks[block].shape_index == shape;
+        let blocks: Vec<usize> = (0..scene.level.blocks.len()).filter(of_shape).collect();
         let (modes, texels) = (
             operators.coefficients_from_direct.rows(),
             operators.coefficients_from_direct.columns(),
         );
         let columns = 3 * blocks.len();
         let light = Matrix::from_fn(texels, columns, |texel, column| {
-            let range = &scene.blocks[blocks[column / 3]].texels;
+            let range = &scene.level.blocks[blocks[column / 3]].texels;
             let channel = column % 3;
             let albedo = scene.texel_albedo(range.start + texel)[channel];
             albedo * direct[3 * range.start + channel * range.len() + texel]

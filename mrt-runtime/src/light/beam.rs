@@ -379,15 +379,16 @@ fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -
 mod tests {
     use super::*;
     use crate::level::block::Level;
-    use crate::light::placed::{Light, place};
-    use crate::modular::assemble::{AssembleConfig, assemble};
+    use crate::light::placed::place;
+    use crate::light::source::Light;
+    use crate::modular::assemble::config::AssembleConfig;
     use crate::modular::dictionary::Dictionary;
-    use mrt_core::container::ByteBudget;
+    use crate::modular::scene::Scene;
 
     /// A room of `width` by `width` cells.
     fn room(width: i32) -> Scene {
         let bytes = include_bytes!("../../../assets/versions/2.mrt");
-        let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20));
+        let dictionary = Dictionary::from_bytes(bytes);
         let cells: Vec<[i32; 3]> = (0..width * width)
             .map(|k| [k % width, 0, k / width])
             .collect();
@@ -396,7 +397,7 @@ mod tests {
             max_depth: 1,
             ..AssembleConfig::default()
         };
-        assemble(&level, &dictionary.expect("sound"), &config).expect("the cells' shapes")
+        Scene::assemble(&level, &dictionary.expect("sound"), &config).expect("the cells' shapes")
     }
 
     fn lamp(scene: &Scene, position: Vec3) -> PlacedLight {
@@ -405,17 +406,17 @@ mod tests {
             radius: 0.1,
             intensity: Vec3::ONE,
         };
-        place(scene, 0, light).expect("inside")
+        place(&scene.level, light).expect("inside")
     }
 
     #[test]
     fn where_too_many_beams_wait_receivers_are_asked() {
         let scene = room(5);
         let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
-        let mut tracer = BeamTracer::new(&scene);
+        let mut tracer = BeamTracer::new(&scene.level);
         tracer.pending = Vec::with_capacity(1);
         let mut exact = vec![0; 25];
-        tracer.trace(&scene, 0, &light, &[], &mut |beam| {
+        tracer.trace(&scene.level, 0, &light, &[], &mut |beam| {
             exact[beam.block.get()] += usize::from(beam.exact);
         });
         assert_eq!(exact, [1; 25]);
@@ -427,11 +428,11 @@ mod tests {
         for width in [10, 40] {
             let scene = room(width);
             let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
-            let mut tracer = BeamTracer::new(&scene);
+            let mut tracer = BeamTracer::new(&scene.level);
             let most = 2 * width as usize;
             tracer.pending = Vec::with_capacity(most);
             let mut beams = 0;
-            tracer.trace(&scene, 0, &light, &[], &mut |beam| {
+            tracer.trace(&scene.level, 0, &light, &[], &mut |beam| {
                 assert!(!beam.exact, "more than {most} were waiting");
                 beams += 1;
             });

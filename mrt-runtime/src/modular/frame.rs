@@ -356,6 +356,11 @@ impl Frame {
         self.report.finish()
     }
 
+    /// The report of the last frame, once more.
+    pub fn last_report(&self) -> FrameReport {
+        self.report.finish()
+    }
+
     /// Lets the next frame compute everything anew, as if nothing were known: for measurements, and for callers who
     /// changed what frames cannot see.
     pub fn forget(&mut self) {
