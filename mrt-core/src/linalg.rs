@@ -3,4 +3,6 @@
 pub mod matrix;
 pub mod parity;
 #[cfg(feature = "svd")]
+pub mod parity_modes;
+#[cfg(feature = "svd")]
 pub mod svd;
