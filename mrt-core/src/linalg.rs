@@ -5,4 +5,6 @@ pub mod parity;
 #[cfg(feature = "svd")]
 pub mod parity_modes;
 #[cfg(feature = "svd")]
+pub mod least_squares;
+#[cfg(feature = "svd")]
 pub mod svd;

@@ -6,14 +6,15 @@
 //! coefficients need no projection; the others are the singular vectors of what `U_b` leaves of the responses.
 
 use crate::modular::outputs::cube::{
-    DIRECTIONS, PROBE_WEIGHT, ProbeSamples, probe_points, texel_axes,
+    DIRECTIONS, PROBE_WEIGHT, ProbeSamples, probe_points, probe_sample, texel_axes,
 };
-use crate::modular::paths::response::{ResponseBasis, pseudo_inverse, rows, stack};
+use crate::modular::paths::response::{ResponseBasis, rows, stack};
 use crate::modular::paths::transport::{RECEIVER, texel_at};
 use crate::modular::surface::mirrors::output_parity_classes;
 use glam::{DVec3, IVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::least_squares::pseudo_inverse;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::parity_modes::{
@@ -203,12 +204,10 @@ pub fn response_at(
         })
         .collect();
     let walls = RECEIVER.texel_count(resolution);
-    let samples = probe_points(probes).flat_map(|p| {
-        let p = back.point(p);
-        DIRECTIONS.iter().map(move |d| {
-            let d: IVec3 = back.direction(d.as_dvec3()).as_ivec3();
-            let direction = DIRECTIONS.iter().position(|&other| other == d);
-            walls + probe_index(p, probes) * DIRECTIONS.len() + direction.unwrap_or(0)
+    let samples = probe_points(probes).flat_map(|point| {
+        DIRECTIONS.iter().map(move |direction| {
+            let direction: IVec3 = back.direction(direction.as_dvec3()).as_ivec3();
+            walls + probe_sample(back.point(point), direction, probes)
         })
     });
     let sources: Vec<Option<usize>> = texels.iter().copied().chain(samples.map(Some)).collect();
@@ -240,11 +239,6 @@ pub fn response_at(
         }
     });
     (field, vector)
-}
-
-fn probe_index(point: DVec3, probes: usize) -> usize {
-    let k = (point * probes as f64).floor().as_uvec3();
-    (k.z as usize * probes + k.y as usize) * probes + k.x as usize
 }
 
 /// Modes as weights of the responses' columns.

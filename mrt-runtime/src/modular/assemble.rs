@@ -16,6 +16,7 @@ use crate::output::lightmap_atlas::AtlasLayout;
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::polar_decomposition::rotation_part;
 use mrt_core::simd::WIDEST;
 use mrt_core::simd::rows::DOT_ROWS;
 use mrt_core::storage::Storage;
@@ -142,14 +143,7 @@ pub fn assemble(
 /// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the
 /// middle, by Newton's iteration for the polar decomposition (Higham 1986).
 fn rotation_of(warp: &Hexahedron) -> DMat3 {
-    let jacobian = warp.jacobian(DVec3::splat(0.5));
-    // Near one in size it converges in a few steps, each of which doubles the digits.
-    let size = jacobian.determinant().cbrt();
-    let mut rotation = jacobian * (1.0 / size);
-    for _ in 0..POLAR_STEPS {
-        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
-    }
-    rotation
+    rotation_part(&warp.jacobian(DVec3::splat(0.5)), POLAR_STEPS)
 }
 
 /// Steps of the polar decomposition: warps that pass the level's check are stretched by up to 1e6.

@@ -7,10 +7,10 @@ use crate::modular::paths::transport::{Gather, Gathered, RECEIVER, Signals, gath
 use crate::modular::surface::mirrors::{output_parity_classes, output_permutation};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::least_squares::pseudo_inverse;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::parity_modes::{GRAM_FLOOR, GramModes, ModeChoice, add_gram_of_rows};
-use mrt_core::linalg::svd::symmetric_eigen;
+use mrt_core::linalg::parity_modes::{GramModes, ModeChoice, add_gram_of_rows};
 use mrt_runtime::modular::path::Word;
 use rayon::prelude::*;
 
@@ -216,24 +216,4 @@ fn of_own_parity(vector: &Matrix<f64>, parity: &[u8], resolution: usize) -> Matr
         });
     }
     part
-}
-
-/// Inverse of a symmetric positive matrix on the space where it is not lost in rounding.
-pub fn pseudo_inverse(matrix: &Matrix<f64>) -> Matrix<f64> {
-    let (values, vectors) = symmetric_eigen(matrix.view());
-    let largest = values.first().copied().unwrap_or(0.0);
-    let inverse: Vec<f64> = values
-        .iter()
-        .map(|&value| {
-            if value > GRAM_FLOOR * largest {
-                1.0 / value
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    multiply(
-        vectors.scaled_columns(&inverse).view(),
-        vectors.transposed().view(),
-    )
 }
