@@ -3,7 +3,6 @@
 use clap::{Parser, Subcommand};
 use mrt_editor::cli::output::exit_code;
 use mrt_editor::cli::{accuracy, adapt, bake, demo, info, light, map, pack};
-use mrt_runtime::Light;
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
