@@ -29,9 +29,8 @@ use mrt_editor::cli::dictionary_source::{
     DEFAULT_PRESET, SourceError, bake_with_progress, from_file, from_preset, with_progress,
 };
 use mrt_editor::render::file::WriteError;
-use mrt_runtime::level::block::MAX_BLOCKS;
-use mrt_runtime::modular::assemble::Coupling;
-use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::low_level::level::block::MAX_BLOCKS;
+use mrt_runtime::{Coupling, Dictionary};
 use ours::{Packing, Variant};
 use record::{Record, mark_pareto, significant};
 use reference::{Reference, ReferenceError};

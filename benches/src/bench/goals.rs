@@ -11,8 +11,7 @@ use super::setting::Setting;
 use super::timing::{Timed, Times, in_turns};
 use mrt_core::simd::SimdLevel;
 use mrt_editor::cli::table::Table;
-use mrt_runtime::modular::assemble::Coupling;
-use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::{Coupling, Dictionary};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -362,7 +361,8 @@ impl Bench<'_> {
             indirect(&times[0]),
             of_paper,
         ));
-        let exact = Reference::load_or_solve(lit, ours.scene.resolution, kept, self.progress)?;
+        let exact =
+            Reference::load_or_solve(lit, ours.scene.level.resolution, kept, self.progress)?;
         let errors = [
             ours.irradiance(&exact.receivers),
             paper.irradiance(&ours.scene, &exact.receivers),

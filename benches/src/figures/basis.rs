@@ -5,7 +5,7 @@ use super::{FigureError, Setting};
 use crate::canvas::{Area, Canvas, Lettering, RULE, Side, diverging};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
-use mrt_runtime::level::shape::SHAPES;
+use mrt_runtime::blocks::SHAPES;
 
 /// Modes shown, in rows of [`MODES_A_ROW`].
 const MODES: usize = 8;

@@ -7,8 +7,7 @@ use mrt_core::reference::error_measure::HOP_GROUPS;
 use mrt_core::reference::oracle_file::{ReferenceFile, oracle_folder, read};
 use mrt_editor::cli::accuracy::{AccuracyArgs, BouncesArg, CouplingArg, LightAccuracy, compare};
 use mrt_editor::cli::dictionary_source::load;
-use mrt_runtime::modular::assemble::AssembleConfig;
-use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::{AssembleConfig, Dictionary};
 use std::borrow::Cow;
 
 /// Irradiance files whose levels every set of shapes can build.

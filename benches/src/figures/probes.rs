@@ -8,13 +8,10 @@ use mrt_editor::render::camera::Camera;
 use mrt_editor::render::level_view::LevelView;
 use mrt_editor::render::render;
 use mrt_editor::render::tone::auto_exposure;
-use mrt_runtime::level::text::from_text;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::frame::{Bounces, Frame, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::{ProbeOrder, irradiance_from_probe};
+use mrt_runtime::FrameConfig;
+use mrt_runtime::Level;
+use mrt_runtime::low_level::output::probes::irradiance_from_probe;
+use mrt_runtime::{AssembleConfig, Bounces, Frame, Light, Outputs, ProbeOrder, Scene};
 use std::f32::consts::PI;
 
 const BOUNCES: u32 = 8;
@@ -31,14 +28,19 @@ struct Sphere {
 }
 
 pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
-    let level = from_text(MAZE)?;
-    let scene = assemble(&level, setting.dictionary, &AssembleConfig::default())?;
+    let level = Level::from_text(MAZE)?;
+    let scene = Scene::assemble(&level, setting.dictionary, &AssembleConfig::default())?;
     let outputs = Outputs {
         lightmap: true,
         probes: Some(ProbeOrder::L2),
         vector: false,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let config = FrameConfig {
+        outputs,
+        bounces: Bounces::Count(BOUNCES),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
     // A warm lamp in the red arm, a cool one in the blue arm, a weak one in the far corner.
     let lamp = |position, intensity| Light::Sphere {
         position,
@@ -50,7 +52,8 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         lamp(Vec3::new(0.6, 0.62, 2.5), Vec3::new(0.6, 0.78, 1.0)),
         lamp(Vec3::new(4.5, 0.62, 3.5), Vec3::splat(0.5)),
     ];
-    frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
+    frame.set_lights(&lights);
+    frame.solve().require_all_lights()?;
     let spheres =
         spheres(&scene, &frame).ok_or(FigureError::NotInDictionary { missing: "probes" })?;
     let shown = LevelView::new(&scene, &frame, &lights, false)?;
@@ -113,7 +116,7 @@ fn spheres(scene: &Scene, frame: &Frame) -> Option<Vec<Sphere>> {
     // All shapes of the maze stand upright, so the canonical y is the level's.
     let layer = (0..n).rev().find(|&k| place(k) <= LAYER)?;
     let mut spheres = Vec::new();
-    for (block, placed) in scene.blocks.iter().enumerate() {
+    for (block, placed) in scene.level.blocks.iter().enumerate() {
         for z in 0..n {
             for x in 0..n {
                 let unit = DVec3::new(place(x), place(layer), place(z));

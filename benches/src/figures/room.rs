@@ -18,7 +18,7 @@ use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport,
 use mrt_dictionary::progress::Progress;
 use mrt_editor::render::camera::Camera;
 use mrt_editor::render::{Picture, render};
-use mrt_runtime::level::shape::SHAPES;
+use mrt_runtime::blocks::SHAPES;
 use std::f32::consts::PI;
 
 /// Modes of the reduced transport: those of the standard preset.

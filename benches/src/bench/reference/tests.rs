@@ -2,8 +2,7 @@ use super::super::ours::{Ours, Packing, Variant};
 use super::*;
 use mrt_core::simd::SimdLevel;
 use mrt_editor::cli::dictionary_source::from_file;
-use mrt_runtime::modular::assemble::Coupling;
-use mrt_runtime::modular::dictionary::Dictionary;
+use mrt_runtime::{Coupling, Dictionary};
 
 fn mobile() -> Dictionary {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/versions/2.mrt");

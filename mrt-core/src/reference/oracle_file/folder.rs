@@ -1,10 +1,11 @@
-//! Where the reference files are.
+//! Finds the folder of reference files.
 
 use std::path::{Path, PathBuf};
 
-/// The folder of reference files, if there is one: `oracle` in the folder that the environment
-/// variable `MRT_SHARED` names, else in a folder `shared` beside this package or any folder above
-/// it.
+/// The folder of reference files, if it exists.
+///
+/// It is `oracle` in the folder that the environment variable `MRT_SHARED` names. If that is not set,
+/// it is `shared/oracle` in the folder of this package or in any folder above it.
 pub fn oracle_folder() -> Option<PathBuf> {
     if let Some(shared) = std::env::var_os("MRT_SHARED") {
         return Some(PathBuf::from(shared).join("oracle")).filter(|folder| folder.is_dir());
@@ -15,8 +16,8 @@ pub fn oracle_folder() -> Option<PathBuf> {
         .find(|folder| folder.is_dir())
 }
 
-/// [`oracle_folder`] for a test that needs it: where it is missing, says on standard error which test
-/// did not run and why, and returns `None`.
+/// [`oracle_folder`] for a test that needs it. If the folder is missing, it reports on standard error
+/// which test did not run and why, and returns `None`.
 ///
 /// # Panics
 /// If the folder is missing and the environment variable `CI` is set.
@@ -25,7 +26,7 @@ pub fn oracle_folder_or_report(test: &str) -> Option<PathBuf> {
     if folder.is_none() {
         let line = format!("not run: {test}: oracle folder not found; set MRT_SHARED");
         assert!(std::env::var_os("CI").is_none(), "{line}");
-        // Not `eprintln`, which the test harness keeps to itself when a test passes.
+        // The test harness hides the output of `eprintln` when a test passes.
         use std::io::Write;
         let written = writeln!(std::io::stderr(), "{line}");
         assert!(written.is_ok(), "{line}");

@@ -1,7 +1,8 @@
 //! Bounces must not grow without end.
 
-use super::blocks::Blocks;
-use crate::modular::scene::{Planes, Scene};
+use crate::modular::frame::light_buffers::LightBuffers;
+use crate::modular::frame::schedule::Schedule;
+use crate::modular::scene::SceneData;
 
 /// Share by which more may arrive of direct light that left the walls, and of what they emit: irradiance is that at
 /// texel centres, whose mean differs from a wall's where light comes from nearby. At 3² texels that is 0.1 % for even
@@ -18,16 +19,15 @@ const WAITING_GAIN: f64 = 2.0;
 /// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
 /// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
 ///
-/// While blocks wait for their light ([`FrameConfig::slice`](super::FrameConfig)), what arrived is partly of earlier
+/// While blocks wait for their light ([`FrameConfig::slice`](crate::modular::frame::config::FrameConfig)), what arrived is partly of earlier
 /// frames, and more than leaves now may be right. [`WAITING_GAIN`] times the most that left since nothing waited is then
 /// the limit.
 ///
 /// Returns how many channels were scaled.
 pub(super) fn limit_flux(
-    scene: &Scene,
-    blocks: &mut Blocks,
-    indirect: &mut Planes,
-    joint: &mut [f32],
+    scene: &SceneData,
+    blocks: &mut Schedule,
+    light: &mut LightBuffers,
     nothing_waits: bool,
 ) -> usize {
     let mut limited = 0;
@@ -36,9 +36,9 @@ pub(super) fn limit_flux(
     blocks.alive.sort_unstable();
     let (mut sent, mut arrived) = ([0.0; 3], [0.0; 3]);
     for &block in &blocks.alive {
-        let state = &blocks.state[block as usize];
+        let state = &blocks.state[block.get()];
         // What arrived may be of joint coefficients that were more.
-        let shape = &scene.shapes[layout.shapes[block as usize] as usize];
+        let shape = &scene.shapes[layout.shape(block)];
         let lag = f64::from(state.lag * shape.area);
         for channel in 0..3 {
             sent[channel] += state.sent[channel] + SPOT_GAIN * state.fresh[channel] + lag;
@@ -60,20 +60,20 @@ pub(super) fn limit_flux(
         limited += 1;
         for k in 0..blocks.alive.len() {
             let block = blocks.alive[k];
-            let place = block as usize;
-            let state = &mut blocks.state[place];
+            let state = &mut blocks.state[block.get()];
             if !state.has_indirect {
                 continue;
             }
             state.arrived[channel] *= scale;
-            let plane = &mut indirect.channels_mut()[channel][layout.slots[place].clone()];
+            let plane = &mut light.indirect.channels_mut()[channel][layout.slots(block)];
             plane.iter_mut().for_each(|e| *e *= scale as f32);
-            let start = (3 * place + channel) * layout.rows;
-            let joint = &mut joint[start..start + layout.rows];
+            let joint = &mut light.joint[scene.rows.of_block(block)];
+            let rows = scene.rows.count;
+            let joint = &mut joint[channel * rows..(channel + 1) * rows];
             joint.iter_mut().for_each(|c| *c *= scale as f32);
             blocks.mark_changed(block);
         }
-        // Which blocks have what they would have anyway, is lost.
+        // Scaling invalidates every cached block: the next pass computes all of them anew.
         blocks.all_stale = true;
     }
     limited
