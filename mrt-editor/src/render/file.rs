@@ -1,6 +1,7 @@
 //! Pictures as files, which are there whole or not at all.
 
-use super::{Picture, hdr};
+use super::hdr;
+use super::picture::Picture;
 use mrt_core::container::{ContainerError, write_file_atomically};
 use std::path::{Path, PathBuf};
 
@@ -26,6 +27,17 @@ pub enum WriteError {
         /// What the encoder says.
         source: png::EncodingError,
     },
+}
+
+/// Makes a folder, and those that it is in.
+///
+/// # Errors
+/// [`WriteError::Io`].
+pub fn make_folder(path: &Path) -> Result<(), WriteError> {
+    std::fs::create_dir_all(path).map_err(|source| WriteError::Io {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// What the encoder of a PNG file saves.

@@ -1,7 +1,7 @@
 //! Radiance HDR: pixels as three mantissas of a byte each and one exponent, run-length encoded (Ward, "Real pixels",
 //! Graphics Gems II, 1991; the file format of Radiance).
 
-use super::Picture;
+use super::picture::Picture;
 use glam::Vec3;
 
 /// Rows of these widths may be run-length encoded; others are stored as they are.
