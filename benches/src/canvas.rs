@@ -10,8 +10,8 @@ use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::prelude::DrawTarget;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
-use mrt_editor::render::Picture;
 use mrt_editor::render::file::{Saves, WriteError, write_png};
+use mrt_editor::render::picture::Picture;
 use mrt_editor::render::tone::tone_map;
 use std::convert::Infallible;
 use std::path::Path;
@@ -19,16 +19,16 @@ use std::path::Path;
 /// An 8-bit sRGB colour.
 pub type Colour = [u8; 3];
 
-/// Of text and axes.
+/// Colour of text and axes.
 pub const INK: Colour = [38, 40, 44];
-/// Of remarks.
+/// Colour of remarks.
 pub const FAINT_INK: Colour = [105, 108, 114];
-/// Of grids and frames.
+/// Colour of grids and frames.
 pub const RULE: Colour = [222, 224, 228];
-/// Of the page.
+/// Colour of the page.
 pub const PAPER: Colour = [255, 255, 255];
 
-/// Okabe and Ito's colours, which people who confuse some colours can tell apart, the palest left out.
+/// Colours of series: Okabe and Ito's, which people who confuse some colours can tell apart, without the palest.
 pub const SERIES: [Colour; 6] = [
     [0, 114, 178],
     [213, 94, 0],
@@ -69,15 +69,37 @@ impl Lettering {
     }
 }
 
-/// Where text stands at its point, which is at half its height.
+/// Which part of a line of text stands at its point, at half its height.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
-    /// To the right of the point.
-    Right,
-    /// Around the point.
+pub enum Anchor {
+    /// Its start: the text is to the right of the point.
+    Start,
+    /// Its middle.
     Middle,
-    /// To the left of the point.
-    Left,
+    /// Its end: the text is to the left of the point.
+    End,
+}
+
+/// How a line of text stands and looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TextStyle {
+    /// Where it stands.
+    pub anchor: Anchor,
+    /// How its letters look.
+    pub lettering: Lettering,
+    /// Its colour.
+    pub colour: Colour,
+}
+
+impl TextStyle {
+    /// In the usual colour of its lettering.
+    pub fn new(anchor: Anchor, lettering: Lettering) -> Self {
+        Self {
+            anchor,
+            lettering,
+            colour: lettering.colour(),
+        }
+    }
 }
 
 /// A rectangle of pixels.
@@ -115,9 +137,9 @@ impl Canvas {
     pub fn titled(size: [i32; 2], title: &str, remarks: &[&str]) -> Self {
         let [width, height] = size.map(|k| k.max(0) as usize);
         let mut page = Self::new(width, height);
-        page.text([20, 22], Side::Right, Lettering::Title, title);
+        page.text([20, 22], Anchor::Start, Lettering::Title, title);
         for (k, remark) in (0i32..).zip(remarks) {
-            page.text([20, 44 + 16 * k], Side::Right, Lettering::Remark, remark);
+            page.text([20, 44 + 16 * k], Anchor::Start, Lettering::Remark, remark);
         }
         page
     }
@@ -127,7 +149,7 @@ impl Canvas {
         [self.width, self.height]
     }
 
-    /// Sets a pixel; one outside the page is left out.
+    /// Sets a pixel; pixels outside the page are left out.
     pub fn set(&mut self, x: i32, y: i32, colour: Colour) {
         self.blend(x, y, colour, 1.0);
     }
@@ -168,7 +190,7 @@ impl Canvas {
     pub fn line(&mut self, from: [f32; 2], to: [f32; 2], width: f32, colour: Colour) {
         let [dx, dy] = [to[0] - from[0], to[1] - from[1]];
         let squared = (dx * dx + dy * dy).max(1e-12);
-        self.cover(from, to, 0.5 * width + 1.0, colour, |x, y| {
+        self.cover(around(from, to, 0.5 * width + 1.0), colour, |x, y| {
             let along = ((x - from[0]) * dx + (y - from[1]) * dy) / squared;
             let along = along.clamp(0.0, 1.0);
             let (x, y) = (x - from[0] - along * dx, y - from[1] - along * dy);
@@ -178,23 +200,19 @@ impl Canvas {
 
     /// A disk with a soft edge.
     pub fn disk(&mut self, at: [f32; 2], radius: f32, colour: Colour) {
-        self.cover(at, at, radius + 1.0, colour, |x, y| {
+        self.cover(around(at, at, radius + 1.0), colour, |x, y| {
             let (x, y) = (x - at[0], y - at[1]);
             radius + 0.5 - (x * x + y * y).sqrt()
         });
     }
 
-    /// Blends a colour by a cover in [0, 1] over the box around two points, `margin` wider.
+    /// Blends a colour into the pixels between two corners, by the share of each pixel that `cover` gives for its middle.
     fn cover(
         &mut self,
-        a: [f32; 2],
-        b: [f32; 2],
-        margin: f32,
+        [low, high]: [[i32; 2]; 2],
         colour: Colour,
         cover: impl Fn(f32, f32) -> f32,
     ) {
-        let low = [0, 1].map(|k| (a[k].min(b[k]) - margin).floor() as i32);
-        let high = [0, 1].map(|k| (a[k].max(b[k]) + margin).ceil() as i32);
         for y in low[1]..=high[1] {
             for x in low[0]..=high[0] {
                 let share = cover(x as f32 + 0.5, y as f32 + 0.5).clamp(0.0, 1.0);
@@ -206,43 +224,35 @@ impl Canvas {
     }
 
     /// One line of text.
-    pub fn text(&mut self, [x, y]: [i32; 2], side: Side, lettering: Lettering, text: &str) {
-        self.coloured_text([x, y], side, lettering, lettering.colour(), text);
+    pub fn text(&mut self, [x, y]: [i32; 2], anchor: Anchor, lettering: Lettering, text: &str) {
+        self.styled_text([x, y], TextStyle::new(anchor, lettering), text);
     }
 
-    /// One line of text in a colour of its own.
-    pub fn coloured_text(
-        &mut self,
-        [x, y]: [i32; 2],
-        side: Side,
-        lettering: Lettering,
-        colour: Colour,
-        text: &str,
-    ) {
-        let style = MonoTextStyle::new(
-            lettering.font(),
-            Rgb888::new(colour[0], colour[1], colour[2]),
-        );
-        let alignment = match side {
-            Side::Right => Alignment::Left,
-            Side::Middle => Alignment::Center,
-            Side::Left => Alignment::Right,
+    /// One line of text in any style.
+    pub fn styled_text(&mut self, [x, y]: [i32; 2], style: TextStyle, text: &str) {
+        let [red, green, blue] = style.colour;
+        let font = style.lettering.font();
+        let letters = MonoTextStyle::new(font, Rgb888::new(red, green, blue));
+        let alignment = match style.anchor {
+            Anchor::Start => Alignment::Left,
+            Anchor::Middle => Alignment::Center,
+            Anchor::End => Alignment::Right,
         };
         let place = TextStyleBuilder::new()
             .alignment(alignment)
             .baseline(Baseline::Middle)
             .build();
-        // Drawing here cannot fail.
-        let Ok(_) = Text::with_text_style(text, Point::new(x, y), style, place).draw(self);
+        // Drawing onto a canvas cannot fail.
+        let Ok(_) = Text::with_text_style(text, Point::new(x, y), letters, place).draw(self);
     }
 
-    /// Tone maps a picture onto the page, as far as `shown` covers it (1 where it does, 0 where not).
+    /// Tone maps a picture onto the page, as far as it is there: `shown` is 1 where it is, 0 where it is not.
     pub fn picture(&mut self, [x, y]: [i32; 2], picture: &Picture, shown: &Picture, exposure: f32) {
         let srgb = tone_map(picture, exposure);
         let pixels = srgb.as_chunks::<3>().0.iter().zip(&shown.pixels);
         for (k, (colour, shown)) in pixels.enumerate() {
             let (i, j) = (k % picture.width, k / picture.width);
-            // At edges the picture holds the mean with black, the share that is paper.
+            // At edges the picture holds the mean with black for the share that is paper.
             let colour =
                 colour.map(|value| f32::from(value) + (1.0 - shown.x) * f32::from(PAPER[0]));
             self.set(
@@ -288,6 +298,14 @@ impl DrawTarget for Canvas {
     }
 }
 
+/// A box of pixels around two points and `margin` more on each side: its corners.
+fn around(a: [f32; 2], b: [f32; 2], margin: f32) -> [[i32; 2]; 2] {
+    [
+        [0, 1].map(|k| (a[k].min(b[k]) - margin).floor() as i32),
+        [0, 1].map(|k| (a[k].max(b[k]) + margin).ceil() as i32),
+    ]
+}
+
 /// `share` of the second colour, the rest of the first.
 pub fn mix(a: Colour, b: Colour, share: f32) -> Colour {
     std::array::from_fn(|k| {
@@ -321,11 +339,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_drawn_stays_on_the_page() {
+    fn drawing_beyond_the_edge_leaves_the_page_as_large_as_it_was() {
         let mut page = Canvas::new(20, 10);
         page.line([-50.0, -50.0], [50.0, 50.0], 2.0, INK);
         page.disk([19.0, 9.0], 5.0, INK);
-        page.text([18, 5], Side::Right, Lettering::Title, "beyond the edge");
+        page.text([18, 5], Anchor::Start, Lettering::Title, "beyond the edge");
         page.fill(
             Area {
                 x: -3,
@@ -340,7 +358,7 @@ mod tests {
     }
 
     #[test]
-    fn signs_have_their_colours_and_zero_is_white() {
+    fn positive_is_red_negative_is_blue_and_zero_is_white() {
         let [r, _, b] = diverging(1.0);
         assert!(r > b);
         let [r, _, b] = diverging(-1.0);

@@ -1,25 +1,25 @@
 //! `mrt-figures`: draws the pictures that explain the method, those of `docs/FIGURES.md`.
 
 mod basis;
+mod error;
 mod hops;
 mod plot;
 mod probes;
 mod room;
+mod source;
 mod spectra;
 mod warps;
 mod white_face;
 
+pub use error::{FigureError, FiguresError};
+
 use crate::canvas::Canvas;
-use mrt_core::reference::oracle_file::ReferenceError;
-use mrt_core::reference::radiosity::ExactError;
-use mrt_dictionary::progress::Cancelled;
-use mrt_editor::cli::accuracy::AccuracyError;
-use mrt_editor::cli::dictionary_source::{SourceError, load};
+use mrt_editor::cli::dictionary_source::load;
+use mrt_editor::cli::output::{check_out_folder, print_report, warn};
 use mrt_editor::cli::table::Table;
-use mrt_editor::render::file::WriteError;
-use mrt_editor::render::level_view::ViewError;
-use mrt_runtime::{AssembleError, Dictionary, LevelTextError, SkippedLight};
+use mrt_editor::render::file::{WriteError, make_folder};
 use serde::Serialize;
+use source::FigureSource;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -45,6 +45,14 @@ pub struct FiguresArgs {
     /// Print the report as one JSON object.
     #[arg(long)]
     pub json: bool,
+}
+
+impl FiguresArgs {
+    /// The figures asked for, or all.
+    fn figures(&self) -> Vec<Figure> {
+        let is_asked_for = |figure: &Figure| self.only.is_empty() || self.only.contains(figure);
+        Figure::ALL.into_iter().filter(is_asked_for).collect()
+    }
 }
 
 /// A picture that can be drawn.
@@ -86,108 +94,16 @@ impl Figure {
         }
     }
 
-    fn draw(self, setting: &Setting) -> Result<Canvas, FigureError> {
+    fn draw(self, source: &FigureSource) -> Result<Canvas, FigureError> {
         match self {
-            Figure::Basis => basis::draw(setting),
-            Figure::Spectra => spectra::draw(setting),
-            Figure::Hops => hops::draw(setting),
-            Figure::Warps => warps::draw(setting),
-            Figure::WhiteFace => white_face::draw(setting),
-            Figure::Probes => probes::draw(setting),
+            Figure::Basis => basis::draw(source),
+            Figure::Spectra => spectra::draw(source),
+            Figure::Hops => hops::draw(source),
+            Figure::Warps => warps::draw(source),
+            Figure::WhiteFace => white_face::draw(source),
+            Figure::Probes => probes::draw(source),
         }
     }
-}
-
-/// What figures are drawn from.
-struct Setting<'a> {
-    dictionary: &'a Dictionary,
-    /// Further presets to compare.
-    presets: &'a [String],
-    /// Texels along an edge of a wall where a figure computes its own transport.
-    resolution: usize,
-}
-
-/// Why a figure was not drawn.
-#[derive(Debug, thiserror::Error)]
-pub enum FigureError {
-    /// There is nothing to compare with.
-    #[error(
-        "the reference files are absent; expected them in the folder oracle of shared/ or of $MRT_SHARED"
-    )]
-    NoReferences,
-    /// The dictionary lacks what the figure shows.
-    #[error(
-        "the dictionary has no {missing}; expected one that `mrt bake` wrote with its defaults"
-    )]
-    NotInDictionary {
-        /// What it lacks.
-        missing: &'static str,
-    },
-    /// No further dictionary.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// The user stopped it.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
-    /// A reference is at fault.
-    #[error(transparent)]
-    Reference(#[from] ReferenceError),
-    /// A comparison failed.
-    #[error(transparent)]
-    Accuracy(#[from] AccuracyError),
-    /// The exact solver refuses.
-    #[error("exact solution: {0}")]
-    Exact(#[from] ExactError),
-    /// The built-in level is at fault.
-    #[error("the built-in maze: {0}")]
-    Level(#[from] LevelTextError),
-    /// Level and dictionary do not fit.
-    #[error(transparent)]
-    Assemble(#[from] AssembleError),
-    /// A light is refused.
-    #[error(transparent)]
-    Skipped(#[from] SkippedLight),
-    /// Nothing can be seen.
-    #[error(transparent)]
-    View(#[from] ViewError),
-}
-
-impl FigureError {
-    /// True where the figure's source is absent, which is no fault of anything.
-    fn is_absence(&self) -> bool {
-        matches!(
-            self,
-            FigureError::NoReferences | FigureError::NotInDictionary { .. }
-        )
-    }
-}
-
-/// Why figures are missing.
-#[derive(Debug, thiserror::Error)]
-pub enum FiguresError {
-    /// No dictionary.
-    #[error(transparent)]
-    Source(#[from] SourceError),
-    /// A file stands where the folder should be.
-    #[error("--out {file}: found a file; expected a folder or a new name")]
-    OutIsFile {
-        /// The file.
-        file: String,
-    },
-    /// A picture cannot be written.
-    #[error(transparent)]
-    Write(#[from] WriteError),
-    /// Some figures could not be drawn; the others were.
-    #[error("{failed} of {count} figures could not be drawn (see above)")]
-    Some {
-        /// How many.
-        failed: usize,
-        /// Of how many.
-        count: usize,
-    },
-    /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
 }
 
 #[derive(Serialize)]
@@ -205,52 +121,33 @@ struct FigureReport {
     seconds: f64,
 }
 
-/// Draws and writes the figures; one that fails is reported and the others are still drawn.
+/// Draws and writes the figures. A figure that fails is reported, and the others are still drawn.
 ///
 /// # Errors
 /// [`FiguresError`]. A figure whose source is absent counts only if it was asked for by name.
 pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
-    if args.out.exists() && !args.out.is_dir() {
-        return Err(FiguresError::OutIsFile {
-            file: args.out.display().to_string(),
-        });
-    }
+    check_out_folder(&args.out)?;
     let dictionary = load(args.dictionary.as_deref(), None)?;
-    let setting = Setting {
+    let source = FigureSource {
         dictionary: &dictionary,
         presets: &args.presets,
         resolution: usize::from(args.resolution),
     };
-    let chosen: Vec<Figure> = Figure::ALL
-        .into_iter()
-        .filter(|figure| args.only.is_empty() || args.only.contains(figure))
-        .collect();
-    std::fs::create_dir_all(&args.out).map_err(|source| WriteError::Io {
-        path: args.out.clone(),
-        source,
-    })?;
+    let chosen = args.figures();
+    make_folder(&args.out)?;
     let mut figures = Vec::new();
     let mut failed = 0;
     for (k, &figure) in chosen.iter().enumerate() {
         let name = figure.name();
         eprintln!("figure {} of {}: {name}", k + 1, chosen.len());
         let start = Instant::now();
-        match figure.draw(&setting) {
-            Ok(canvas) => {
-                let path = args.out.join(format!("{name}.png"));
-                figures.push(FigureReport {
-                    figure: name,
-                    file: path.display().to_string(),
-                    size: canvas.size(),
-                    bytes: canvas.write(&path)?,
-                    seconds: start.elapsed().as_secs_f64(),
-                });
-            }
+        match figure.draw(&source) {
+            Ok(canvas) => figures.push(write(args, name, &canvas, start)?),
             Err(error) if error.is_absence() && args.only.is_empty() => {
-                eprintln!("mrt-figures: {name} is left out: {error}");
+                warn(format_args!("{name} is left out: {error}"));
             }
             Err(error) => {
-                eprintln!("mrt-figures: {name}: {error}");
+                warn(format_args!("{name}: {error}"));
                 failed += 1;
             }
         }
@@ -259,11 +156,7 @@ pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
         preset: dictionary.preset.clone(),
         figures,
     };
-    if args.json {
-        mrt_editor::report_line!("{}", serde_json::to_string(&report)?);
-    } else {
-        print(&report);
-    }
+    print_report(&report, args.json, print)?;
     match failed {
         0 => Ok(()),
         failed => Err(FiguresError::Some {
@@ -271,6 +164,22 @@ pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
             count: chosen.len(),
         }),
     }
+}
+
+fn write(
+    args: &FiguresArgs,
+    name: &'static str,
+    canvas: &Canvas,
+    start: Instant,
+) -> Result<FigureReport, WriteError> {
+    let path = args.out.join(format!("{name}.png"));
+    Ok(FigureReport {
+        figure: name,
+        file: path.display().to_string(),
+        size: canvas.size(),
+        bytes: canvas.write(&path)?,
+        seconds: start.elapsed().as_secs_f64(),
+    })
 }
 
 fn print(report: &FiguresReport) {

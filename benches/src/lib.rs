@@ -2,5 +2,6 @@
 //! pictures of `docs/FIGURES.md`. Both report as the tool `mrt` does.
 
 pub mod canvas;
+pub mod dense_product;
 pub mod bench;
 pub mod figures;

@@ -3,22 +3,23 @@
 //! The range is found by random sketches with one power iteration (Halko, Martinsson and Tropp, "Finding structure with
 //! randomness", SIAM Review 53(2), 2011, algorithms 4.4 and 5.1).
 
-use super::library::{Libraries, Library, Sum, WrongProduct, difference, product};
-use super::ours::Ours;
-use super::reference::Receiver;
-use super::setting::{ALBEDO, Setting};
+use super::library::{Libraries, WrongProduct};
+use super::lit_maze::{ALBEDO, LitMaze};
+use super::sampled_texel::SampledTexel;
+use super::timed_frame::TimedFrame;
 use super::timing::Timed;
+use crate::dense_product::{Library, Output, difference, product};
 use mrt_core::lighting::sampling::hash;
 use mrt_core::linalg::matrix::{Matrix, MatrixView, dot, multiply};
 use mrt_core::linalg::svd::symmetric_eigen;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene};
-use mrt_editor::cli::reference_level::exact_scene;
+use mrt_editor::accuracy::exact_level::exact_scene;
 use mrt_runtime::BlockIndex;
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-/// Texels of a level whose F is made: 268 MB.
+/// Texels of a level whose F is made, at most: F then takes 268 MB.
 pub const MAX_TEXELS: usize = 1 << 13;
 
 /// Columns of a sketch beyond the largest rank.
@@ -33,7 +34,7 @@ pub enum DenseError {
     /// A library is wrong.
     #[error(transparent)]
     Product(#[from] WrongProduct),
-    /// The factors do not give the light of F.
+    /// The factors differ too much from F.
     #[error(
         "F as factors of rank {rank} differs by {found:.1e} from F; expected at most {expected:.1e}"
     )]
@@ -42,7 +43,7 @@ pub enum DenseError {
         rank: usize,
         /// Relative difference in the norm of F.
         found: f64,
-        /// Twice what the singular values left out amount to.
+        /// Twice the part of F that the singular values left out hold.
         expected: f64,
     },
 }
@@ -60,9 +61,9 @@ impl Dense {
     ///
     /// # Errors
     /// [`DenseError::Exact`].
-    pub fn new(setting: &Setting, ours: &Ours) -> Result<Self, DenseError> {
+    pub fn new(maze: &LitMaze, ours: &TimedFrame) -> Result<Self, DenseError> {
         let resolution = ours.scene.level.resolution;
-        let exact = exact_scene(&setting.level, resolution)?;
+        let exact = exact_scene(&maze.level, resolution)?;
         let transport = Transport::build(&exact);
         let count = exact.texel_count();
         let operator = Matrix::from_fn(count, count, |i, j| transport.factor(i, j) as f32);
@@ -111,10 +112,10 @@ impl Dense {
         Product::new(factors.iter().collect(), &self.radiosity, libraries)
     }
 
-    /// Truncated decompositions, each as right and left factor: F is nearly left times right.
+    /// Truncated decompositions, each as a right and a left factor: F is nearly left times right.
     ///
     /// # Errors
-    /// [`DenseError::Factors`], if one is not as close to F as its singular values say.
+    /// [`DenseError::Factors`], if the factors are not as close to F as the singular values say.
     pub fn decompositions(&self, ranks: &[usize]) -> Result<Vec<[Matrix<f32>; 2]>, DenseError> {
         let count = self.operator.rows();
         let most = ranks.iter().copied().max().unwrap_or(0);
@@ -125,14 +126,20 @@ impl Dense {
         };
         let times = |a: &Matrix<f32>, b: &Matrix<f32>| {
             let mut out = Matrix::zeros(a.rows(), b.columns());
-            product(Library::Gemm, a.view(), b.view(), out.data_mut(), Sum::New);
+            product(
+                Library::Gemm,
+                a.view(),
+                b.view(),
+                out.data_mut(),
+                Output::Replace,
+            );
             out
         };
         let transposed = self.operator.transposed();
         let sketch = times(&self.operator, &Matrix::from_fn(count, width, normal));
         let sketch = times(&transposed, &orthonormal(&sketch));
         let range = orthonormal(&times(&self.operator, &orthonormal(&sketch)));
-        // Rows of F in the range: their Gram matrix has the squared singular values.
+        // The rows of F projected onto the range: the eigenvalues of their Gram matrix are the squared singular values.
         let inside = times(&transposed, &range);
         let gram = times(&inside.transposed(), &inside).cast::<f64>();
         let (squares, vectors) = symmetric_eigen(gram.view());
@@ -144,7 +151,7 @@ impl Dense {
                 let vectors = vectors.leading_columns(rank).cast::<f32>();
                 let right = times(&inside, &vectors).transposed();
                 let left = times(&range, &vectors);
-                // F less its projection, by Pythagoras.
+                // The norm of what the projection leaves out, by Pythagoras.
                 let kept: f64 = squares[..rank].iter().sum();
                 let expected = 2.0 * (1.0 - kept / (size * size)).max(0.0).sqrt() + 1e-3;
                 let found = self.sampled_difference(&left, &right);
@@ -160,7 +167,7 @@ impl Dense {
             .collect()
     }
 
-    /// Relative difference of every 64th column.
+    /// Relative difference of left times right from F in every 64th column.
     fn sampled_difference(&self, left: &Matrix<f32>, right: &Matrix<f32>) -> f64 {
         let (mut found, mut exact) = (Vec::new(), Vec::new());
         for column in (0..self.operator.columns()).step_by(64) {
@@ -171,17 +178,17 @@ impl Dense {
         difference(&found, &exact)
     }
 
-    /// Light of a product at receivers.
-    pub fn irradiance(&self, light: &Matrix<f32>, receivers: &[Receiver]) -> Vec<[f64; 3]> {
+    /// Light of a product at sampled texels.
+    pub fn irradiance(&self, light: &Matrix<f32>, texels: &[SampledTexel]) -> Vec<[f64; 3]> {
         let resolution = self.exact.resolution();
-        let at = |receiver: &Receiver| {
+        let at = |sampled: &SampledTexel| {
             let mut walls = self.exact.walls().iter();
-            let wall = walls.find(|w| (w.block, w.face) == (receiver.block, receiver.face));
+            let wall = walls.find(|w| (w.block, w.face) == (sampled.block, sampled.face));
             let first = wall.map_or(0, |wall| wall.first_texel);
-            let texel = first + receiver.row * resolution + receiver.column;
+            let texel = first + sampled.row * resolution + sampled.column;
             std::array::from_fn(|channel| f64::from(light[(texel, channel)]))
         };
-        receivers.iter().map(at).collect()
+        texels.iter().map(at).collect()
     }
 }
 
@@ -211,7 +218,7 @@ fn orthonormal(matrix: &Matrix<f32>) -> Matrix<f32> {
 pub struct Product<'a> {
     factors: Vec<(&'a Matrix<f32>, Library)>,
     radiosity: &'a Matrix<f32>,
-    /// What each factor makes; the last is irradiance.
+    /// The product after each factor; the last is irradiance.
     results: Vec<Matrix<f32>>,
 }
 
@@ -254,7 +261,7 @@ impl<'a> Product<'a> {
         factors.map(|(factor, _)| size_of_val(factor.data())).sum()
     }
 
-    /// Operations, a product and a sum being two.
+    /// Operations, a multiplication and an addition being two.
     pub fn flops(&self) -> f64 {
         6.0 * self.bytes() as f64 / 4.0
     }
@@ -272,7 +279,7 @@ impl Timed for Product<'_> {
                 factor.view(),
                 input.view(),
                 after[0].data_mut(),
-                Sum::New,
+                Output::Replace,
             );
         }
         vec![start.elapsed().as_secs_f64()]

@@ -1,15 +1,16 @@
-//! One-bounce gathering by ray tracing: rays of cosine density from each texel, and direct light where they end.
+//! One-bounce gathering by ray tracing: rays of cosine density from each texel, which bring the direct light of the points
+//! that they meet.
 
-use super::rays::{RayScene, Traced, WallPoint};
-use super::setting::ALBEDO;
+use super::lit_maze::ALBEDO;
+use super::rays::{RayPoint, RayScene, Traced};
 use glam::Vec3;
 use mrt_core::lighting::sampling::{cosine_hemisphere_from_square, sobol_point, square_from_unit};
 use std::time::Instant;
 
 /// Irradiance at points of walls from `count` rays each.
-pub fn trace(scene: &RayScene, receivers: &[WallPoint], count: usize) -> Traced {
+pub fn trace(scene: &RayScene, receivers: &[RayPoint], count: usize) -> Traced {
     let start = Instant::now();
-    let gather = |(seed, receiver): (u32, &WallPoint)| {
+    let gather = |(seed, receiver): (u32, &RayPoint)| {
         let (tangent, bitangent) = receiver.normal.any_orthonormal_pair();
         let mut sum = Vec3::ZERO;
         for k in 0..count as u32 {

@@ -1,4 +1,4 @@
-//! What this machine can do at most, measured in the same process as what it is compared with.
+//! What this machine can do at most, measured in the same process as the frames that are compared with it.
 
 use super::timing::{Timed, fastest};
 use mrt_core::simd::{Kernel, Lanes, SimdLevel};
@@ -7,30 +7,30 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Sums that a core can keep going at once: four cycles of latency times two units is eight, and some are spare.
+/// Sums that a core computes at once: four cycles of latency times two units make eight, and some are spare.
 const ACCUMULATORS: usize = 12;
 
-/// Products and sums of a lane in one call: long against the clock's resolution, short against a time slice.
+/// Multiplications and additions of a lane in one call: long against the clock's resolution, short against a time slice.
 const STEPS: usize = 20_000;
 
-/// Bytes of the buffers that are read: one in the second level of any cache of the last ten years, two in the third
-/// level of most, and one far larger than the caches that a core reaches.
+/// Bytes of the buffers that are read: the first fits into the second-level cache of any processor of the last ten years,
+/// two fit into the third level of most, and the last is far larger than the caches that a core reaches.
 const BUFFERS: [usize; 4] = [256 << 10, 4 << 20, 16 << 20, 256 << 20];
 
-/// Time spent on each figure.
+/// Time spent on each measurement.
 const BUDGET: Duration = Duration::from_millis(120);
 
 /// Limits of one core.
 #[derive(Clone, Debug)]
 pub struct Machine {
-    /// Floating-point operations a second in units of 1e9, a fused product and sum being two, of each level.
+    /// For each level of instructions, floating-point operations a second in units of 1e9; a fused multiply-add is two.
     pub gflops: Vec<(SimdLevel, f64)>,
-    /// Bytes of a buffer and GB/s at which it is read again and again; the smallest first.
+    /// Bytes of a buffer, and GB/s at which it is read again and again; the smallest first.
     pub reads: Vec<(usize, f64)>,
 }
 
 impl Machine {
-    /// Measures all levels that there are; takes about a second.
+    /// Measures all levels of instructions that the machine has; takes about a second.
     pub fn measure() -> Self {
         let level = SimdLevel::detect();
         let read = |bytes: usize| (bytes, bandwidth(level, &vec![1.0f32; bytes / 4]));
@@ -42,13 +42,13 @@ impl Machine {
         }
     }
 
-    /// Peak of so many threads with a level's instructions.
+    /// Operations a second of a number of threads with a level's instructions, in units of 1e9.
     pub fn peak(&self, level: SimdLevel, threads: usize) -> f64 {
         let of_level = self.gflops.iter().find(|(known, _)| *known == level);
         of_level.map_or(f64::NAN, |(_, gflops)| gflops * threads as f64)
     }
 
-    /// GB/s at which so many bytes can be read again and again: that of the smallest buffer in which they fit.
+    /// GB/s at which a number of bytes can be read again and again: that of the smallest buffer in which they fit.
     pub fn bandwidth(&self, bytes: usize) -> f64 {
         let fitting = self.reads.iter().find(|(buffer, _)| bytes <= *buffer);
         fitting
@@ -62,15 +62,15 @@ impl Machine {
     }
 }
 
-/// Sums that fit into registers, shared out between threads that need nothing from each other: how much faster these get
-/// done is all that the machine gives to anybody.
+/// Sums that fit into registers, shared out between threads that need nothing from each other. No other work gains more
+/// by these threads on this machine.
 pub struct Shared(ThreadPool);
 
 /// Parts of [`Shared`].
 const PARTS: usize = 16;
 
 impl Shared {
-    /// With so many threads.
+    /// With a number of threads.
     ///
     /// # Errors
     /// If the system gives no threads.
@@ -109,7 +109,7 @@ fn peak(level: SimdLevel) -> f64 {
 
 fn bandwidth(level: SimdLevel, buffer: &[f32]) -> f64 {
     let time = fastest(BUDGET, || {
-        black_box(level.run(Sum(black_box(buffer))));
+        black_box(level.run(BufferSum(black_box(buffer))));
     });
     size_of_val(buffer) as f64 / time.as_secs_f64() / 1e9
 }
@@ -135,10 +135,10 @@ impl Kernel for FusedSums {
     }
 }
 
-/// Sum of a buffer.
-struct Sum<'a>(&'a [f32]);
+/// BufferSum of a buffer.
+struct BufferSum<'a>(&'a [f32]);
 
-impl Kernel for Sum<'_> {
+impl Kernel for BufferSum<'_> {
     type Output = f32;
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> f32 {
@@ -158,10 +158,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_level_does_the_same_sums() {
+    fn all_levels_of_instructions_sum_alike() {
         for level in SimdLevel::available() {
             let buffer = vec![0.5f32; 1 << 12];
-            assert_eq!(level.run(Sum(&buffer)), 2048.0);
+            assert_eq!(level.run(BufferSum(&buffer)), 2048.0);
             let sums = level.run(FusedSums {
                 factor: 1.0,
                 term: 0.0,

@@ -1,28 +1,34 @@
 //! A level the paper's way, by libraries of dense products: `T_d->b` and `U_b` of each shape on all its blocks at once,
 //! `T_b->r` block-sparse, and one `U_r` an opening (Loos et al. 2011, section 7.3).
 //!
-//! Nothing is folded, skipped or packed; a library chosen by trial computes each product. What the walls reflect is made
-//! beforehand and not timed, and neither is clamping.
+//! Nothing is folded, skipped or packed; a library chosen by trial computes each product. The reflected direct light is
+//! computed beforehand and not timed, and results are not clamped.
 
-use super::library::{Libraries, Library, Sum, WrongProduct, difference, product};
-use super::ours::{Cost, Ours, assemble_config, texel_of};
-use super::reference::Receiver;
-use super::setting::{ALBEDO, Setting};
+mod operators;
+
+use super::frame_variant::assemble_config;
+use super::library::{Libraries, WrongProduct};
+use super::lit_maze::LitMaze;
+use super::sampled_texel::SampledTexel;
+use super::timed_frame::{Cost, TimedFrame, texel_of};
 use super::timing::Timed;
+use crate::dense_product::{Library, Output, difference, product};
 use mrt_core::linalg::matrix::{Matrix, MatrixView, multiply, multiply_add};
-use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
-use mrt_runtime::low_level::modular::opening_responses::{OpeningResponses, responses_by_opening};
+use mrt_runtime::low_level::modular::opening_responses::responses_by_opening;
 use mrt_runtime::{AssembleError, Coupling, Dictionary, Scene};
-use std::collections::BTreeMap;
+use operators::{Arrival, Group, PaperOperators, Place};
 use std::time::Instant;
 
 /// Names of the stages that are timed.
 pub const STAGES: [&str; 3] = ["T_d->b", "T_b->r", "U_b, U_r"];
 
+/// All stages.
+pub const ALL_STAGES: [usize; STAGES.len()] = [0, 1, 2];
+
 /// Blocks whose light is computed a second time by reference products, at most.
 const CHECKED_BLOCKS: usize = 24;
 
-/// Relative difference to these at which the answer is wrong.
+/// Relative difference from the reference products above which the answer is wrong.
 const TOLERANCE: f64 = 1e-4;
 
 /// Why the paper's way was not measured.
@@ -46,89 +52,46 @@ pub enum PaperError {
     },
 }
 
-/// A shape, and the signals of its blocks side by side, three columns a block.
-struct Group {
-    blocks: Vec<usize>,
-    coefficients_from_direct: Matrix<f32>,
-    indirect_basis: Matrix<f32>,
-    /// One an opening.
-    response_bases: Vec<Matrix<f32>>,
-    libraries: [Library; 3],
-    light: Matrix<f32>,
-    coefficients: Matrix<f32>,
-    /// One an opening.
-    responses: Vec<Matrix<f32>>,
-    irradiance: Matrix<f32>,
-}
-
-/// All responses behind one opening: `[R_1 R_2 ..]` times the sources' coefficients, one below the other.
-struct Arrival {
-    /// Group, opening, and position in the group of the target.
-    target: (usize, usize, usize),
-    /// Group and position of each source.
-    sources: Vec<(usize, usize)>,
-    operator: Matrix<f32>,
-    library: Library,
-}
-
 /// A level the paper's way.
 pub struct Paper {
     groups: Vec<Group>,
-    /// Group and position of each block.
-    place: Vec<(usize, usize)>,
+    /// By block of the level.
+    places: Vec<Place>,
     arrivals: Vec<Arrival>,
+    /// The coefficients of an arrival's sources.
     gathered: Vec<f32>,
-    /// Response modes kept.
+    /// Number of response modes kept.
     pub response_modes: usize,
 }
 
 impl Paper {
-    /// Prepares all operators for the direct light of `ours`, chooses libraries and checks the answer.
+    /// Prepares all operators for the direct light of a frame, chooses libraries and checks the answer.
     ///
     /// Transport between blocks is by lightfields, as in the paper, where the dictionary has them. As many response
-    /// modes are kept as a block has modes: those that carry most in this level.
+    /// modes are kept as a block has modes: those that carry most light in this level.
     ///
     /// # Errors
     /// [`PaperError`].
     pub fn new(
-        setting: &Setting,
+        maze: &LitMaze,
         dictionary: &Dictionary,
-        ours: &Ours,
+        frame: &TimedFrame,
         libraries: &mut Libraries,
     ) -> Result<Self, PaperError> {
-        let scene = &ours.scene;
+        let scene = &frame.scene;
         let config = assemble_config(Coupling::Lightfield);
-        let all = responses_by_opening(&setting.level, scene, dictionary, &config)?;
-        let bases: Vec<Vec<Matrix<f32>>> = (0..scene.shapes.len())
-            .map(|shape| response_bases(scene, dictionary, shape))
-            .collect();
-        let kept = strongest_modes(scene, &bases, &all, dictionary.response_modes());
-        let mut groups = groups(scene, dictionary, &ours.direct(), &bases, &kept);
-        let mut place = vec![(0, 0); scene.level.blocks.len()];
-        for (g, group) in groups.iter().enumerate() {
-            for (k, &block) in group.blocks.iter().enumerate() {
-                place[block] = (g, k);
-            }
-        }
-        for group in &mut groups {
-            let columns = group.light.columns();
-            group.libraries = [
-                libraries.fastest(group.coefficients_from_direct.view(), columns)?,
-                libraries.fastest(group.indirect_basis.view(), columns)?,
-                match group.response_bases.first() {
-                    Some(basis) => libraries.fastest(basis.view(), columns)?,
-                    None => Library::Gemm,
-                },
-            ];
-        }
-        let arrivals = arrivals(&all, &place, &kept, libraries)?;
+        let responses = responses_by_opening(&maze.level, scene, dictionary, &config)?;
+        let operators = PaperOperators::new(scene, dictionary, &responses);
+        let groups = operators.groups(&frame.direct(), libraries)?;
+        let places = places(&groups, scene.blocks.len());
+        let arrivals = operators.arrivals(&responses, &places, libraries)?;
         let longest = arrivals.iter().map(|a| 3 * a.operator.columns()).max();
         let mut paper = Self {
             groups,
-            place,
+            places,
             arrivals,
             gathered: vec![0.0; longest.unwrap_or(0)],
-            response_modes: kept.len(),
+            response_modes: operators.kept.len(),
         };
         paper.run();
         paper.check()?;
@@ -164,7 +127,7 @@ impl Paper {
         matrices.map(|matrix| size_of_val(matrix.data())).sum()
     }
 
-    /// What each stage has to do.
+    /// The least that each stage has to do.
     pub fn costs(&self) -> [Cost; STAGES.len()] {
         let flops = self.flops();
         let mut bytes = [0; STAGES.len()];
@@ -189,7 +152,7 @@ impl Paper {
         })
     }
 
-    /// Operations of each stage, a product and a sum being two.
+    /// Operations of each stage, a multiplication and an addition being two.
     fn flops(&self) -> [f64; STAGES.len()] {
         let of =
             |matrix: &Matrix<f32>, columns: usize| 2.0 * (matrix.data().len() * columns) as f64;
@@ -208,42 +171,26 @@ impl Paper {
         flops
     }
 
-    /// Indirect irradiance of the last run.
-    pub fn irradiance(&self, scene: &Scene, receivers: &[Receiver]) -> Vec<[f64; 3]> {
-        let at = |receiver: &Receiver| {
-            let (group, position) = self.place[receiver.block];
-            let texel = texel_of(scene, receiver);
+    /// Indirect irradiance of the last run at sampled texels, W/m².
+    pub fn irradiance(&self, scene: &Scene, texels: &[SampledTexel]) -> Vec<[f64; 3]> {
+        let at = |sampled: &SampledTexel| {
+            let Place { group, position } = self.places[sampled.block];
+            let texel = texel_of(scene, sampled);
             let irradiance = &self.groups[group].irradiance;
             std::array::from_fn(|c| f64::from(irradiance[(texel, 3 * position + c)]))
         };
-        receivers.iter().map(at).collect()
+        texels.iter().map(at).collect()
     }
 
     /// Compares some blocks with products of the reference.
     fn check(&self) -> Result<(), PaperError> {
-        let step = self.place.len().div_ceil(CHECKED_BLOCKS);
-        for block in (0..self.place.len()).step_by(step) {
-            let (g, position) = self.place[block];
-            let group = &self.groups[g];
-            let own = self.reference_coefficients((g, position));
-            let mut expected = multiply(group.indirect_basis.view(), own.view());
-            let behind = |a: &&Arrival| (a.target.0, a.target.2) == (g, position);
-            for arrival in self.arrivals.iter().filter(behind) {
-                let basis = &group.response_bases[arrival.target.1];
-                let mut response = Matrix::zeros(basis.columns(), 3);
-                let mut from = 0;
-                for &source in &arrival.sources {
-                    let b = self.reference_coefficients(source);
-                    let part = arrival.operator.columns_view(from..from + b.rows());
-                    multiply_add(part, b.view(), response.data_mut());
-                    from += b.rows();
-                }
-                multiply_add(basis.view(), response.view(), expected.data_mut());
-            }
+        let step = self.places.len().div_ceil(CHECKED_BLOCKS);
+        for block in (0..self.places.len()).step_by(step) {
+            let Place { group, position } = self.places[block];
             let columns = 3 * position..3 * position + 3;
             let found = difference(
-                group.irradiance.columns_view(columns).data(),
-                expected.data(),
+                self.groups[group].irradiance.columns_view(columns).data(),
+                self.reference_irradiance(self.places[block]).data(),
             );
             if found.is_nan() || found > TOLERANCE {
                 return Err(PaperError::Answer { block, found });
@@ -252,152 +199,48 @@ impl Paper {
         Ok(())
     }
 
-    fn reference_coefficients(&self, (group, position): (usize, usize)) -> Matrix<f32> {
+    fn reference_irradiance(&self, place: Place) -> Matrix<f32> {
+        let group = &self.groups[place.group];
+        let own = self.reference_coefficients(place);
+        let mut irradiance = multiply(group.indirect_basis.view(), own.view());
+        for arrival in self.arrivals.iter().filter(|a| a.target == place) {
+            let basis = &group.response_bases[arrival.opening];
+            let mut response = Matrix::zeros(basis.columns(), 3);
+            let mut from = 0;
+            for &source in &arrival.sources {
+                let b = self.reference_coefficients(source);
+                let part = arrival.operator.columns_view(from..from + b.rows());
+                multiply_add(part, b.view(), response.data_mut());
+                from += b.rows();
+            }
+            multiply_add(basis.view(), response.view(), irradiance.data_mut());
+        }
+        irradiance
+    }
+
+    fn reference_coefficients(&self, Place { group, position }: Place) -> Matrix<f32> {
         let group = &self.groups[group];
         let light = group.light.columns_view(3 * position..3 * position + 3);
         multiply(group.coefficients_from_direct.view(), light)
     }
-}
 
-/// A shape of the scene as the dictionary has it.
-fn operators<'a>(
-    scene: &Scene,
-    dictionary: &'a Dictionary,
-    shape: usize,
-) -> Option<&'a ShapeOperators> {
-    let block = scene.blocks.iter().position(|b| b.shape_index == shape)?;
-    dictionary
-        .shape_index(scene.level.blocks[block].shape)
-        .map(|k| &dictionary.shapes[k])
-}
-
-/// `U_r` of each opening of a shape of the scene, with all response modes.
-fn response_bases(scene: &Scene, dictionary: &Dictionary, shape: usize) -> Vec<Matrix<f32>> {
-    let Some(entry) = operators(scene, dictionary, shape) else {
-        return Vec::new();
-    };
-    let bases = entry.openings.iter().filter_map(|opening| {
-        let projection = opening.joint_from_response.first()?;
-        Some(multiply(entry.joint_basis.view(), projection.view()))
-    });
-    bases.collect()
-}
-
-/// As many response modes as a block has modes, ascending: those that add most irradiance over all arrivals.
-fn strongest_modes(
-    scene: &Scene,
-    bases: &[Vec<Matrix<f32>>],
-    all: &[OpeningResponses],
-    count: usize,
-) -> Vec<usize> {
-    let square = |x: &f32| f64::from(*x) * f64::from(*x);
-    let mut energy = vec![0.0; count];
-    for arrival in all {
-        let basis = &bases[scene.blocks[arrival.target.get()].shape_index][arrival.opening];
-        for (mode, energy) in energy.iter_mut().enumerate() {
-            let columns = arrival.responses.columns();
-            let row = (0..columns).map(|j| square(&arrival.responses[(mode, j)]));
-            *energy += row.sum::<f64>() * basis.column(mode).iter().map(square).sum::<f64>();
-        }
-    }
-    let modes = scene.blocks.iter().map(|b| b.coefficients.len()).max();
-    let mut order: Vec<usize> = (0..count).collect();
-    order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
-    order.truncate(modes.unwrap_or(count));
-    order.sort_unstable();
-    order
-}
-
-fn groups(
-    scene: &Scene,
-    dictionary: &Dictionary,
-    direct: &[f32],
-    bases: &[Vec<Matrix<f32>>],
-    kept: &[usize],
-) -> Vec<Group> {
-    let group = |shape: usize| {
-        let operators = operators(scene, dictionary, shape)?;
-        let of_shape = |&block: &usize| scene.blocks[block].shape_index == shape;
-        let blocks: Vec<usize> = (0..scene.level.blocks.len()).filter(of_shape).collect();
-        let (modes, texels) = (
-            operators.coefficients_from_direct.rows(),
-            operators.coefficients_from_direct.columns(),
-        );
-        let columns = 3 * blocks.len();
-        let light = Matrix::from_fn(texels, columns, |texel, column| {
-            let range = &scene.level.blocks[blocks[column / 3]].texels;
-            let channel = column % 3;
-            // The benchmark's levels have one albedo.
-            let albedo = ALBEDO[channel];
-            albedo * direct[3 * range.start + channel * range.len() + texel]
-        });
-        let response_bases: Vec<Matrix<f32>> = bases[shape]
-            .iter()
-            .map(|basis| Matrix::from_fn(texels, kept.len(), |i, j| basis[(i, kept[j])]))
-            .collect();
-        Some(Group {
-            coefficients_from_direct: operators.coefficients_from_direct.clone(),
-            indirect_basis: operators.joint_basis.leading_columns(modes),
-            libraries: [Library::Gemm; 3],
-            light,
-            coefficients: Matrix::zeros(modes, columns),
-            responses: vec![Matrix::zeros(kept.len(), columns); response_bases.len()],
-            irradiance: Matrix::zeros(texels, columns),
-            response_bases,
-            blocks,
-        })
-    };
-    (0..scene.shapes.len()).filter_map(group).collect()
-}
-
-/// Responses gathered by where they arrive.
-fn arrivals(
-    all: &[OpeningResponses],
-    place: &[(usize, usize)],
-    kept: &[usize],
-    libraries: &mut Libraries,
-) -> Result<Vec<Arrival>, WrongProduct> {
-    let mut by_opening: BTreeMap<(usize, usize), Vec<&OpeningResponses>> = BTreeMap::new();
-    for arrival in all {
-        let key = (arrival.target.get(), arrival.opening);
-        by_opening.entry(key).or_default().push(arrival);
-    }
-    let mut arrivals = Vec::with_capacity(by_opening.len());
-    for ((target, opening), parts) in by_opening {
-        let mut columns: Vec<Vec<f32>> = Vec::new();
-        for part in &parts {
-            let rows = part.responses.selected_rows(kept);
-            columns.extend((0..rows.columns()).map(|j| rows.column(j).to_vec()));
-        }
-        let operator = Matrix::from_columns(kept.len(), &columns);
-        let (group, position) = place[target];
-        arrivals.push(Arrival {
-            target: (group, opening, position),
-            sources: parts.iter().map(|part| place[part.source.get()]).collect(),
-            library: libraries.fastest(operator.view(), 3)?,
-            operator,
-        });
-    }
-    Ok(arrivals)
-}
-
-impl Timed for Paper {
-    fn run(&mut self) -> Vec<f64> {
-        let start = Instant::now();
+    fn compute_coefficients(&mut self) {
         for group in &mut self.groups {
             product(
                 group.libraries[0],
                 group.coefficients_from_direct.view(),
                 group.light.view(),
                 group.coefficients.data_mut(),
-                Sum::New,
+                Output::Replace,
             );
         }
-        let after_coefficients = Instant::now();
+    }
+
+    fn compute_responses(&mut self) {
         for arrival in &self.arrivals {
             let rows = arrival.operator.columns();
             let mut from = 0;
-            for &(group, position) in &arrival.sources {
+            for &Place { group, position } in &arrival.sources {
                 let b = &self.groups[group].coefficients;
                 for channel in 0..3 {
                     let column = b.column(3 * position + channel);
@@ -406,25 +249,27 @@ impl Timed for Paper {
                 }
                 from += b.rows();
             }
-            let (group, opening, position) = arrival.target;
-            let out = &mut self.groups[group].responses[opening];
+            let Place { group, position } = arrival.target;
+            let out = &mut self.groups[group].responses[arrival.opening];
             let size = 3 * out.rows();
             product(
                 arrival.library,
                 arrival.operator.view(),
                 MatrixView::new(rows, 3, &self.gathered[..3 * rows]),
                 &mut out.data_mut()[position * size..(position + 1) * size],
-                Sum::New,
+                Output::Replace,
             );
         }
-        let after_responses = Instant::now();
+    }
+
+    fn compute_irradiance(&mut self) {
         for group in &mut self.groups {
             product(
                 group.libraries[1],
                 group.indirect_basis.view(),
                 group.coefficients.view(),
                 group.irradiance.data_mut(),
-                Sum::New,
+                Output::Replace,
             );
             for (basis, responses) in group.response_bases.iter().zip(&group.responses) {
                 product(
@@ -432,17 +277,39 @@ impl Timed for Paper {
                     basis.view(),
                     responses.view(),
                     group.irradiance.data_mut(),
-                    Sum::Add,
+                    Output::Add,
                 );
             }
         }
-        let end = Instant::now();
-        [
-            after_coefficients - start,
-            after_responses - after_coefficients,
-            end - after_responses,
-        ]
-        .map(|time| time.as_secs_f64())
-        .to_vec()
+    }
+}
+
+/// The place of each block.
+fn places(groups: &[Group], blocks: usize) -> Vec<Place> {
+    let mut places = vec![Place::default(); blocks];
+    for (index, group) in groups.iter().enumerate() {
+        for (position, &block) in group.blocks.iter().enumerate() {
+            places[block] = Place {
+                group: index,
+                position,
+            };
+        }
+    }
+    places
+}
+
+impl Timed for Paper {
+    fn run(&mut self) -> Vec<f64> {
+        let stages: [fn(&mut Self); STAGES.len()] = [
+            Self::compute_coefficients,
+            Self::compute_responses,
+            Self::compute_irradiance,
+        ];
+        let time = |stage: fn(&mut Self)| {
+            let start = Instant::now();
+            stage(self);
+            start.elapsed().as_secs_f64()
+        };
+        stages.map(time).to_vec()
     }
 }

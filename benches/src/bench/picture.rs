@@ -1,7 +1,7 @@
 //! Charts as SVG and as PNG.
 
-use super::chart::{Mark, SIZE};
-use crate::canvas::{Canvas, Colour, Lettering, Side};
+use super::chart::mark::{Mark, SIZE};
+use crate::canvas::{Anchor, Canvas, Colour, Lettering, TextStyle};
 use std::fmt::Write;
 
 /// A chart as the text of an SVG file.
@@ -14,57 +14,55 @@ pub fn svg(marks: &[Mark]) -> String {
     );
     for mark in marks {
         // Writing to a string cannot fail.
-        let _ = match mark {
-            Mark::Line {
-                from: [x1, y1],
-                to: [x2, y2],
-                width,
-                colour,
-            } => writeln!(
-                text,
-                "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{}\" \
-                 stroke-width=\"{width}\" stroke-linecap=\"round\"/>",
-                hex(*colour)
-            ),
-            Mark::Disk {
-                at: [x, y],
-                radius,
-                colour,
-            } => writeln!(
-                text,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
-                hex(*colour)
-            ),
-            Mark::Text {
-                at: [x, y],
-                side,
-                lettering,
-                colour,
-                text: words,
-            } => {
-                let anchor = match side {
-                    Side::Right => "start",
-                    Side::Middle => "middle",
-                    Side::Left => "end",
-                };
-                let (size, weight) = match lettering {
-                    Lettering::Title => (15, "bold"),
-                    Lettering::Heading => (13, "bold"),
-                    Lettering::Label => (13, "normal"),
-                    Lettering::Remark => (11, "normal"),
-                };
-                writeln!(
-                    text,
-                    "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
-                     font-weight=\"{weight}\" fill=\"{}\">{}</text>",
-                    hex(*colour),
-                    escaped(words)
-                )
-            }
-        };
+        let _ = writeln!(text, "{}", element(mark));
     }
     text.push_str("</svg>\n");
     text
+}
+
+/// A mark as an element of SVG.
+fn element(mark: &Mark) -> String {
+    match mark {
+        Mark::Line {
+            from: [x1, y1],
+            to: [x2, y2],
+            width,
+            colour,
+        } => format!(
+            "<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\" stroke=\"{}\" \
+             stroke-width=\"{width}\" stroke-linecap=\"round\"/>",
+            hex(*colour)
+        ),
+        Mark::Disk {
+            at: [x, y],
+            radius,
+            colour,
+        } => format!(
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
+            hex(*colour)
+        ),
+        Mark::Text { at, style, text } => text_element(*at, *style, text),
+    }
+}
+
+fn text_element([x, y]: [i32; 2], style: TextStyle, text: &str) -> String {
+    let anchor = match style.anchor {
+        Anchor::Start => "start",
+        Anchor::Middle => "middle",
+        Anchor::End => "end",
+    };
+    let (size, weight) = match style.lettering {
+        Lettering::Title => (15, "bold"),
+        Lettering::Heading => (13, "bold"),
+        Lettering::Label => (13, "normal"),
+        Lettering::Remark => (11, "normal"),
+    };
+    format!(
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-size=\"{size}\" \
+         font-weight=\"{weight}\" fill=\"{}\">{}</text>",
+        hex(style.colour),
+        escaped(text)
+    )
 }
 
 fn hex([r, g, b]: Colour) -> String {
@@ -90,13 +88,7 @@ pub fn canvas(marks: &[Mark]) -> Canvas {
                 colour,
             } => page.line(*from, *to, *width, *colour),
             Mark::Disk { at, radius, colour } => page.disk(*at, *radius, *colour),
-            Mark::Text {
-                at,
-                side,
-                lettering,
-                colour,
-                text,
-            } => page.coloured_text(*at, *side, *lettering, *colour, text),
+            Mark::Text { at, style, text } => page.styled_text(*at, *style, text),
         }
     }
     page
@@ -105,15 +97,12 @@ pub fn canvas(marks: &[Mark]) -> Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canvas::INK;
 
     #[test]
     fn text_that_looks_like_markup_stays_text() {
         let mark = Mark::Text {
             at: [1, 2],
-            side: Side::Right,
-            lettering: Lettering::Label,
-            colour: INK,
+            style: TextStyle::new(Anchor::Start, Lettering::Label),
             text: "a < b & c".to_owned(),
         };
         let text = svg(&[mark]);

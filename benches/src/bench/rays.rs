@@ -1,7 +1,7 @@
 //! What ray methods share: the level's walls as triangles, and its lights.
 
-use super::reference::Receiver;
-use super::setting::Setting;
+use super::lit_maze::{LitMaze, MazeLamp};
+use super::sampled_texel::SampledTexel;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::bvh::{Bvh, Hit};
 use mrt_core::geometry::cube::Face;
@@ -11,38 +11,38 @@ use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 /// How far off a wall rays start, metres.
 const OFFSET: f32 = 1e-4;
 
-/// Walls in a tree, and lights.
+/// Walls in a tree, and lamps.
 pub struct RayScene {
     bvh: Bvh,
     mesh: TriangleMesh,
-    lights: Vec<(Vec3, f32, Vec3)>,
+    lamps: Vec<MazeLamp>,
 }
 
-/// A point of a wall.
+/// A point of a wall, to or from which rays are cast.
 #[derive(Clone, Copy, Debug)]
-pub struct WallPoint {
+pub struct RayPoint {
     /// World position, a little off the wall.
     pub position: Vec3,
     /// Unit normal, into the block.
     pub normal: Vec3,
 }
 
-impl WallPoint {
+impl RayPoint {
     /// A texel's centre.
-    pub fn of(receiver: &Receiver) -> Self {
-        let normal = receiver.normal.as_vec3();
+    pub fn of(texel: &SampledTexel) -> Self {
+        let normal = texel.normal.as_vec3();
         Self {
-            position: receiver.position.as_vec3() + OFFSET * normal,
+            position: texel.position.as_vec3() + OFFSET * normal,
             normal,
         }
     }
 }
 
 impl RayScene {
-    /// Two triangles a wall.
-    pub fn new(setting: &Setting) -> Self {
+    /// The walls of a maze as two triangles each.
+    pub fn new(maze: &LitMaze) -> Self {
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-        for block in &setting.level.blocks {
+        for block in &maze.level.blocks {
             for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
                 let first = positions.len() as u32;
                 let corners = block.warp.face_corners(face);
@@ -55,13 +55,13 @@ impl RayScene {
         Self {
             bvh: Bvh::build(&mesh),
             mesh,
-            lights: setting.spheres(),
+            lamps: maze.lamps(),
         }
     }
 
-    /// Position, radius and intensity of each light.
-    pub fn lights(&self) -> &[(Vec3, f32, Vec3)] {
-        &self.lights
+    /// What direct light comes from.
+    pub fn lamps(&self) -> &[MazeLamp] {
+        &self.lamps
     }
 
     /// Bytes of triangles and tree, roughly: corners twice, indices, and two nodes of 32 bytes a triangle.
@@ -69,8 +69,8 @@ impl RayScene {
         self.mesh.triangles.len() * (36 + 36 + 12 + 64)
     }
 
-    /// The first wall that a ray meets. Walls have two sides: where blocks are not joined, theirs coincide.
-    pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> Option<WallPoint> {
+    /// The first wall that a ray meets, seen from its side: where blocks are not joined, their walls coincide.
+    pub fn first_hit(&self, origin: Vec3, direction: Vec3) -> Option<RayPoint> {
         let Hit { triangle, t, .. } = self.bvh.closest_hit(origin, direction, f32::INFINITY)?;
         let [a, b, c] = self.mesh.corners(triangle as usize);
         let normal = (b - a).cross(c - a).normalize();
@@ -79,7 +79,7 @@ impl RayScene {
         } else {
             normal
         };
-        Some(WallPoint {
+        Some(RayPoint {
             position: origin + t * direction + OFFSET * normal,
             normal,
         })
@@ -90,27 +90,28 @@ impl RayScene {
         !self.bvh.is_occluded(from, to - from, 1.0)
     }
 
-    /// Direct irradiance at a point of a wall, by one shadow ray a light that is above its horizon.
-    pub fn direct(&self, at: &WallPoint) -> Vec3 {
+    /// Direct irradiance at a point of a wall, by one shadow ray to each lamp that is above its horizon.
+    pub fn direct(&self, at: &RayPoint) -> Vec3 {
         let mut sum = Vec3::ZERO;
-        for &(position, radius, intensity) in &self.lights {
-            let offset: DVec3 = (position - at.position).as_dvec3();
-            let e = sphere_light_irradiance(offset, at.normal.as_dvec3(), f64::from(radius)) as f32;
-            if e > 0.0 && self.sees(at.position, position) {
-                sum += e * intensity;
+        for lamp in &self.lamps {
+            let offset: DVec3 = (lamp.position - at.position).as_dvec3();
+            let radius = f64::from(lamp.radius);
+            let e = sphere_light_irradiance(offset, at.normal.as_dvec3(), radius) as f32;
+            if e > 0.0 && self.sees(at.position, lamp.position) {
+                sum += e * lamp.intensity;
             }
         }
         sum
     }
 }
 
-/// Time and result of a ray method at the receivers.
+/// Time and result of a ray method at sampled texels.
 #[derive(Clone, Debug, Default)]
 pub struct Traced {
     /// Seconds that do not depend on the number of texels.
     pub start_seconds: f64,
-    /// Seconds of each receiver.
+    /// Seconds for each sampled texel.
     pub receiver_seconds: f64,
-    /// Indirect irradiance.
+    /// Indirect irradiance of each, W/m².
     pub irradiance: Vec<[f64; 3]>,
 }

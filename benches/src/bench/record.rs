@@ -9,30 +9,30 @@ use std::fmt::Write;
 /// A stage of a frame.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageRecord {
-    /// Its name.
+    /// Name of the stage.
     pub stage: &'static str,
     /// Median time, milliseconds.
     pub ms: f64,
-    /// Operations of the dense products a second, in units of 1e9; 0 where there is no product.
+    /// Operations of products a second, in units of 1e9; 0 where there is no product.
     pub gflops: f64,
-    /// The same as a share of what the instructions and threads in use can do at most.
+    /// `gflops` as a share of what the instructions and threads in use can do at most.
     pub peak_share: f64,
     /// Bytes read and written a second, each counted once, in units of 1e9.
     pub gbytes_per_s: f64,
-    /// The same as a share of the bandwidth measured: that of memory, or of the caches where everything fits.
+    /// `gbytes_per_s` as a share of the measured bandwidth: of memory, or of the caches where everything fits.
     pub bandwidth_share: f64,
 }
 
 /// One way to light one level.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
-    /// Level and way, such as "maze41/standard/avx2/t1".
+    /// The level and the way to light it, such as "maze41/standard/avx2/t1".
     pub case: String,
-    /// The level.
+    /// Name of the level.
     pub level: String,
-    /// Its blocks.
+    /// Number of its blocks.
     pub blocks: usize,
-    /// Its lights.
+    /// Number of its lights.
     pub lights: usize,
     /// "mrt", "paper", "dense", "svd", "vpl" or "gather".
     pub method: &'static str,
@@ -40,7 +40,7 @@ pub struct Record {
     pub preset: String,
     /// Texels along an edge of a wall.
     pub resolution: usize,
-    /// Modes `k_b`, kept singular values, virtual lights, or rays a texel.
+    /// Number of modes `k_b`, kept singular values, virtual lights, or rays a texel.
     pub size: usize,
     /// How operators are stored.
     pub storage: &'static str,
@@ -52,19 +52,20 @@ pub struct Record {
     pub threads: usize,
     /// Libraries of dense products in use, joined by "+".
     pub library: String,
-    /// Median time from direct light to indirect light, milliseconds; of ray methods from lights to indirect light.
+    /// Median time from direct light to indirect light, milliseconds; for ray methods from lights to indirect light.
     pub ms: f64,
-    /// Smallest such time.
+    /// The smallest of these times.
     pub ms_min: f64,
-    /// Median time from lights to indirect light: with direct light at all texels, which ray methods do without.
+    /// Median time from lights to indirect light, milliseconds: with direct light at all texels, except for ray methods,
+    /// which do without it.
     pub ms_from_lights: f64,
-    /// Timed runs.
+    /// Number of timed runs.
     pub runs: usize,
     /// Relative L2 error of first-bounce indirect irradiance at texel centres.
     pub rel_l2: f64,
     /// `ms` of the paper's dense products for the same level and preset.
     pub paper_dense_ms: f64,
-    /// Bytes held.
+    /// Bytes held while frames are computed.
     pub bytes: usize,
     /// Bytes that a frame reads and writes, each once.
     pub bytes_touched: usize,
@@ -97,11 +98,11 @@ pub fn mark_pareto(records: &mut [Record]) {
     }
 }
 
-/// Share of an error that does not count as a difference: storage and the order of sums move errors by less.
+/// Errors that differ by less than this share count as equal: storage and the order of sums move errors by less.
 const SAME_ERROR: f64 = 0.005;
 
-/// For each point of time and error whether none is faster with an error no larger, up to [`SAME_ERROR`]; of points of
-/// equal time the best, and of equal points the first.
+/// For each point of time and error, whether no other point is faster with an error that is no larger, up to
+/// [`SAME_ERROR`]. Of points of equal time only the best counts, and of equal points only the first.
 pub fn frontier(points: &[[f64; 2]]) -> Vec<bool> {
     let is_beaten = |k: usize| {
         let [time, error] = points[k];
@@ -172,7 +173,7 @@ pub fn stages_csv(records: &[Record]) -> String {
     text
 }
 
-/// What the machine can do.
+/// The limits of the machine, one a line.
 pub fn machine_csv(machine: &Machine) -> String {
     let mut text = "limit,value\n".to_owned();
     for (level, gflops) in &machine.gflops {
@@ -184,7 +185,7 @@ pub fn machine_csv(machine: &Machine) -> String {
     text
 }
 
-/// A field of CSV: dictionaries may have any name.
+/// A field of CSV, in quotes where its text needs them: dictionaries may have any name.
 pub fn quoted(field: &str) -> String {
     if field.contains([',', '"', '\n']) {
         format!("\"{}\"", field.replace('"', "\"\""))
@@ -222,8 +223,8 @@ pub fn overview(records: &[Record]) -> Table {
     table
 }
 
-/// For each level and resolution, rays that a texel could have in the time that the fastest setting of the frame takes:
-/// a sentence each.
+/// For each level and resolution, a sentence on how many rays could be sent from each texel in the time that the fastest
+/// setting of the frame takes.
 pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
     let mut fastest: BTreeMap<(&str, usize), &Record> = BTreeMap::new();
     for record in records.iter().filter(|r| r.method == "mrt") {
@@ -234,7 +235,7 @@ pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
         }
     }
     let sentence = |ours: &Record| {
-        // The longest sweep has the smallest overhead a ray.
+        // The run with the most rays has the smallest overhead a ray.
         let rays = records
             .iter()
             .filter(|r| (&r.level, r.resolution) == (&ours.level, ours.resolution))
@@ -251,7 +252,7 @@ pub fn rays_at_equal_time(records: &[Record]) -> Vec<String> {
     fastest.into_values().filter_map(sentence).collect()
 }
 
-/// Shares of what the machine can do.
+/// Stages, and their shares of what the machine can do at most.
 pub fn stages(records: &[Record]) -> Table {
     let mut table = Table::new(&[
         "case",
@@ -282,7 +283,7 @@ pub fn stages(records: &[Record]) -> Table {
     table
 }
 
-/// Three digits that mean something, no exponent.
+/// A number with three significant digits and without an exponent.
 pub fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -324,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn the_frontier_holds_what_nothing_of_its_kind_beats() {
+    fn a_record_is_best_if_no_other_of_its_method_beats_it() {
         let mut records = vec![
             record("mrt", 1.0, 0.1),
             record("mrt", 2.0, 0.05),
@@ -338,13 +339,13 @@ mod tests {
     }
 
     #[test]
-    fn fields_with_commas_are_quoted() {
+    fn csv_fields_with_commas_and_quotes_are_quoted() {
         let text = csv(&[record("mrt", 1.0, 0.1)]);
         assert!(text.contains(",\"a \"\"b\"\", c\",6,"), "{text}");
     }
 
     #[test]
-    fn numbers_have_three_digits() {
+    fn numbers_have_three_significant_digits() {
         assert_eq!(significant(0.012345), "0.0123");
         assert_eq!(significant(12.345), "12.3");
         assert_eq!(significant(12345.6), "12346");

@@ -1,13 +1,13 @@
-//! Times on machines that others use too: subjects take turns, so that what disturbs one disturbs all, and medians
-//! and smallest values are reported. A turn is a burst of runs, the first of which does not count: it finds caches
-//! filled by the subject before.
+//! Times on machines that others use too. Subjects take turns, so that a disturbance hits all of them, and medians and
+//! smallest values are reported. A turn is a burst of runs, the first of which does not count: it finds the caches filled
+//! by another subject.
 
 use mrt_dictionary::progress::{Cancelled, Progress};
 use std::time::{Duration, Instant};
 
-/// Something that is timed stage by stage.
+/// Work that is timed stage by stage.
 pub trait Timed {
-    /// Does it once; seconds of each stage, always equally many.
+    /// Does the work once; returns the seconds of each stage, of which there are always as many.
     fn run(&mut self) -> Vec<f64>;
 }
 
@@ -25,7 +25,7 @@ impl Times {
         sums.get(sums.len() / 2).copied().unwrap_or(f64::NAN)
     }
 
-    /// Smallest such sum, seconds.
+    /// The smallest of these sums, seconds.
     pub fn smallest(&self, stages: &[usize]) -> f64 {
         self.sums(stages).into_iter().fold(f64::INFINITY, f64::min)
     }
@@ -49,16 +49,16 @@ impl Times {
 /// Turns of each subject, at least.
 const FEWEST: usize = 3;
 
-/// Runs of each subject, at most: more change a median no further.
+/// Runs of each subject, at most: more hardly change a median.
 const MOST: usize = 1000;
 
-/// A turn goes on for so long, and for one run at least.
+/// A turn takes at least this long, and at least one run.
 const TURN: Duration = Duration::from_millis(4);
 
-/// After so many budgets no further turn begins, however few there were: very large levels take seconds a run.
+/// After this number of budgets no further turn begins, however few there were: very large levels take seconds a run.
 const PATIENCE: u32 = 20;
 
-/// Runs all subjects in turns until `budget` for each is spent, at least three times where they are not very slow.
+/// Runs all subjects in turns until `budget` for each is spent, and at least three turns unless they are very slow.
 ///
 /// # Errors
 /// [`Cancelled`].
@@ -77,7 +77,7 @@ pub fn in_turns(
     {
         for (subject, times) in subjects.iter_mut().zip(&mut times) {
             progress.check()?;
-            // What takes longer than a turn does not depend on what the caches held before.
+            // A run that takes longer than a turn does not depend on what the caches held before.
             let is_short = |run: &Vec<f64>| run.iter().sum::<f64>() < TURN.as_secs_f64();
             if times.runs.last().is_none_or(is_short) {
                 subject.run();
@@ -100,7 +100,7 @@ pub fn in_turns(
     Ok(times)
 }
 
-/// Time of the fastest of many calls within a budget.
+/// Time of the fastest call; calls are repeated until the budget is spent, and at least three times.
 pub fn fastest(budget: Duration, mut call: impl FnMut()) -> Duration {
     call();
     let start = Instant::now();

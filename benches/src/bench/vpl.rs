@@ -1,43 +1,43 @@
 //! Indirect light from virtual point lights with shadow rays (Keller, "Instant radiosity", SIGGRAPH 1997).
 //!
-//! Light paths end at their first wall, which makes one bounce. Close to a virtual light the geometric term is
-//! bounded: no distance counts as less than the radius of the disc that the light stands for.
+//! Light paths end at their first wall, which makes one bounce. Close to a virtual light the geometric term is bounded: no
+//! distance counts as less than the radius of the disc that the light stands for.
 
-use super::rays::{RayScene, Traced, WallPoint};
-use super::setting::ALBEDO;
+use super::lit_maze::ALBEDO;
+use super::rays::{RayPoint, RayScene, Traced};
 use glam::Vec3;
 use mrt_core::lighting::sampling::{sobol_point, sphere_from_square, square_from_unit};
 use std::f32::consts::PI;
 use std::time::Instant;
 
-/// Walls of the block around a light, m²: what its virtual lights share.
+/// Area of the walls around a lamp, m², which its virtual lights share.
 const LIT_AREA: f32 = 6.0;
 
-/// Light that a wall sends on from where a ray of a light meets it.
+/// The light that a wall reflects where a ray from a lamp meets it.
 struct VirtualLight {
-    at: WallPoint,
+    at: RayPoint,
     /// W, RGB.
     flux: Vec3,
 }
 
-/// Irradiance at points of walls from `count` virtual lights, shared by the lights equally; at least one each.
-pub fn trace(scene: &RayScene, receivers: &[WallPoint], count: usize) -> Traced {
+/// Irradiance at points of walls from `count` virtual lights, as many of each lamp and at least one.
+pub fn trace(scene: &RayScene, receivers: &[RayPoint], count: usize) -> Traced {
     let start = Instant::now();
-    let per_light = (count / scene.lights().len()).max(1);
-    let mut virtual_lights = Vec::with_capacity(per_light * scene.lights().len());
-    for (light, &(position, _, intensity)) in (0u32..).zip(scene.lights()) {
+    let per_light = (count / scene.lamps().len()).max(1);
+    let mut virtual_lights = Vec::with_capacity(per_light * scene.lamps().len());
+    for (index, lamp) in (0u32..).zip(scene.lamps()) {
         for k in 0..per_light as u32 {
-            let square = square_from_unit(sobol_point(k, light));
+            let square = square_from_unit(sobol_point(k, index));
             let direction = sphere_from_square(square).as_vec3();
-            if let Some(at) = scene.first_hit(position, direction) {
-                let flux = ALBEDO * intensity * (4.0 * PI / per_light as f32);
+            if let Some(at) = scene.first_hit(lamp.position, direction) {
+                let flux = ALBEDO * lamp.intensity * (4.0 * PI / per_light as f32);
                 virtual_lights.push(VirtualLight { at, flux });
             }
         }
     }
     let least_squared = LIT_AREA / (PI * per_light as f32);
     let after_start = Instant::now();
-    let gather = |receiver: &WallPoint| {
+    let gather = |receiver: &RayPoint| {
         let mut sum = Vec3::ZERO;
         for VirtualLight { at, flux } in &virtual_lights {
             let offset = at.position - receiver.position;

@@ -1,22 +1,28 @@
-//! The first modes of the closed cube, unfolded (the paper's figure 2): implicit lights and the indirect light
-//! that they make.
+//! The first modes of the closed cube, unfolded (the paper's figure 2): implicit lights and the indirect light that they
+//! make.
 
-use super::{FigureError, Setting};
-use crate::canvas::{Area, Canvas, Lettering, RULE, Side, diverging};
+use super::error::FigureError;
+use super::source::FigureSource;
+use crate::canvas::{Anchor, Area, Canvas, Lettering, RULE, diverging};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_runtime::blocks::SHAPES;
+use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
 
-/// Modes shown, in rows of [`MODES_A_ROW`].
+/// Modes shown, and modes in a row.
 const MODES: usize = 8;
 const MODES_A_ROW: usize = 4;
-/// Pixels of a face.
+
+/// Pixels along an edge of a face, of an unfolded cube, and between two of them.
 const FACE: i32 = 50;
 const NET: [i32; 2] = [4 * FACE, 3 * FACE];
 const GAP: i32 = 22;
+
+/// Pixels to the left of the modes, and above them.
 const LEFT: i32 = 96;
 const TOP: i32 = 92;
-/// Pixels from one row of modes to the next: two nets, the labels, a gap.
+
+/// Pixels from one row of modes to the next: two unfolded cubes, the labels and a gap.
 const ROW: i32 = 2 * NET[1] + 58;
 
 /// Faces of the unfolded cube as seen from inside looking at -z: column and row from the top left.
@@ -29,13 +35,11 @@ const PLACES: [(Face, [i32; 2]); 6] = [
     (Face::PosZ, [3, 1]),
 ];
 
-pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
+pub(super) fn draw(source: &FigureSource) -> Result<Canvas, FigureError> {
     let missing = |missing| FigureError::NotInDictionary { missing };
-    let dictionary = setting.dictionary;
-    let index = dictionary
-        .shape_index(&SHAPES[0])
-        .ok_or(missing("closed cube"))?;
-    let entry = &dictionary.shapes[index];
+    let dictionary = source.dictionary;
+    let index = dictionary.shape_index(&SHAPES[0]);
+    let entry = &dictionary.shapes[index.ok_or(missing("closed cube"))?];
     if entry.implicit_lighting.columns() == 0 {
         return Err(missing("implicit lighting"));
     }
@@ -49,38 +53,52 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             "of such patterns; a frame computes their weights, one number each. Numbers: strength relative to mode 2.",
         ],
     );
-    // Enrichment makes the first mode, uniform light, as strong as it likes: the second is the measure.
-    let measure = entry.singular_values.get(1).copied().unwrap_or(1.0);
+    for row in 0..rows {
+        draw_row_labels(&mut canvas, TOP + row * ROW);
+    }
     for mode in 0..MODES.min(entry.modes()) {
         let (row, column) = ((mode / MODES_A_ROW) as i32, (mode % MODES_A_ROW) as i32);
-        let [x, y] = [LEFT + column * (NET[0] + GAP), TOP + row * ROW];
-        let label = match entry.singular_values[mode] / measure {
-            _ if mode == 0 => "mode 1 (even light)".to_owned(),
-            strength => format!("mode {}: {strength:.2}", mode + 1),
-        };
-        canvas.text([x, y], Side::Right, Lettering::Heading, &label);
-        let resolution = dictionary.resolution;
-        let light = entry.implicit_lighting.column(mode);
-        let indirect = entry.joint_basis.column(mode);
-        unfold(&mut canvas, [x, y + 12], resolution, light);
-        unfold(&mut canvas, [x, y + 20 + NET[1]], resolution, indirect);
-        if column == 0 {
-            for (lines, y) in [
-                (["implicit", "light", "L_imp"], y + 12),
-                (["indirect", "light", "U_b"], y + 20 + NET[1]),
-            ] {
-                for (k, line) in lines.into_iter().enumerate() {
-                    let y = y + NET[1] / 2 + 16 * (k as i32 - 1);
-                    canvas.text([LEFT - 12, y], Side::Left, Lettering::Label, line);
-                }
-            }
-        }
+        let at = [LEFT + column * (NET[0] + GAP), TOP + row * ROW];
+        draw_mode(&mut canvas, at, dictionary.resolution, entry, mode);
     }
     draw_key(&mut canvas, [LEFT, TOP + rows * ROW - 8]);
     Ok(canvas)
 }
 
-/// A signal on the walls of the closed cube as a cross of its faces, each from inside.
+/// A mode's implicit light above the indirect light that it makes.
+fn draw_mode(
+    canvas: &mut Canvas,
+    [x, y]: [i32; 2],
+    resolution: usize,
+    entry: &ShapeOperators,
+    mode: usize,
+) {
+    // Enrichment can make the first mode, uniform light, as strong as it likes, so the second is the measure.
+    let measure = entry.singular_values.get(1).copied().unwrap_or(1.0);
+    let label = match entry.singular_values[mode] / measure {
+        _ if mode == 0 => "mode 1 (even light)".to_owned(),
+        strength => format!("mode {}: {strength:.2}", mode + 1),
+    };
+    canvas.text([x, y], Anchor::Start, Lettering::Heading, &label);
+    let light = entry.implicit_lighting.column(mode);
+    let indirect = entry.joint_basis.column(mode);
+    unfold(canvas, [x, y + 12], resolution, light);
+    unfold(canvas, [x, y + 20 + NET[1]], resolution, indirect);
+}
+
+fn draw_row_labels(canvas: &mut Canvas, y: i32) {
+    for (lines, y) in [
+        (["implicit", "light", "L_imp"], y + 12),
+        (["indirect", "light", "U_b"], y + 20 + NET[1]),
+    ] {
+        for (k, line) in (0..).zip(lines) {
+            let y = y + NET[1] / 2 + 16 * (k - 1);
+            canvas.text([LEFT - 12, y], Anchor::End, Lettering::Label, line);
+        }
+    }
+}
+
+/// A signal on the walls of the closed cube as a cross of its faces, each seen from inside.
 fn unfold(canvas: &mut Canvas, [x, y]: [i32; 2], resolution: usize, signal: &[f32]) {
     let largest = signal.iter().fold(0.0f32, |sum, x| sum.max(x.abs()));
     let per_wall = resolution * resolution;
@@ -128,16 +146,16 @@ fn draw_key(canvas: &mut Canvas, [x, y]: [i32; 2]) {
         };
         canvas.fill(column, diverging(value));
     }
-    canvas.text([x + 70, y], Side::Left, Lettering::Label, "negative");
+    canvas.text([x + 70, y], Anchor::End, Lettering::Label, "negative");
     canvas.text(
         [x + 76 + WIDTH + 6, y],
-        Side::Right,
+        Anchor::Start,
         Lettering::Label,
         "positive",
     );
     canvas.text(
         [x + 76 + WIDTH + 90, y],
-        Side::Right,
+        Anchor::Start,
         Lettering::Remark,
         "each pattern scaled to its largest value; white is zero",
     );

@@ -1,26 +1,26 @@
 //! Plots: axes with units, lines through points, a legend.
 
-use crate::canvas::{Area, Canvas, Colour, INK, Lettering, PAPER, RULE, Side};
+use crate::canvas::{Anchor, Area, Canvas, Colour, INK, Lettering, PAPER, RULE};
 
 /// How values become places along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Equal differences are equally long.
+    /// Equal differences take equal lengths.
     Linear,
-    /// Equal ratios are equally long.
+    /// Equal ratios take equal lengths.
     Logarithmic,
 }
 
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with its unit.
+    /// The quantity, with its unit.
     pub label: &'static str,
-    /// Spacing.
+    /// How values are spaced.
     pub scale: Scale,
     /// Values at both ends.
     pub range: [f64; 2],
-    /// Values that are named, and their names.
+    /// Values that are marked, and their names.
     pub ticks: Vec<(f64, String)>,
 }
 
@@ -39,9 +39,9 @@ impl Axis {
 /// How a series looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Of line and marks.
+    /// Colour of line and marks.
     pub colour: Colour,
-    /// True for a line in dashes.
+    /// True for a dashed line.
     pub is_dashed: bool,
     /// Radius of the marks at the points; 0 for none.
     pub mark: f32,
@@ -50,17 +50,20 @@ pub struct Stroke {
 /// A plot and its place on the page.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// Inside the axes.
+    /// The area inside the axes.
     pub area: Area,
-    /// Across.
+    /// The axis across.
     pub x: Axis,
-    /// Up.
+    /// The axis upwards.
     pub y: Axis,
 }
 
 /// Pixels of a letter.
 const LETTER: i32 = 8;
+
+/// Pixels.
 const LINE_WIDTH: f32 = 2.0;
+
 /// Pixels of a dash and of the gap after it.
 const DASH: [f32; 2] = [7.0, 5.0];
 
@@ -75,55 +78,38 @@ impl Plot {
         } = self.area;
         for (value, name) in &self.x.ticks {
             let at = x + (self.x.place(*value) * width as f32) as i32;
-            canvas.fill(
-                Area {
-                    x: at,
-                    y,
-                    width: 1,
-                    height,
-                },
-                RULE,
+            canvas.fill(area(at, y, 1, height), RULE);
+            canvas.text(
+                [at, y + height + 12],
+                Anchor::Middle,
+                Lettering::Label,
+                name,
             );
-            canvas.text([at, y + height + 12], Side::Middle, Lettering::Label, name);
         }
         for (value, name) in &self.y.ticks {
             let at = y + height - (self.y.place(*value) * height as f32) as i32;
-            canvas.fill(
-                Area {
-                    x,
-                    y: at,
-                    width,
-                    height: 1,
-                },
-                RULE,
-            );
-            canvas.text([x - 7, at], Side::Left, Lettering::Label, name);
+            canvas.fill(area(x, at, width, 1), RULE);
+            canvas.text([x - 7, at], Anchor::End, Lettering::Label, name);
         }
-        let axis = |x, y, width, height| Area {
-            x,
-            y,
-            width,
-            height,
-        };
-        canvas.fill(axis(x, y, 1, height), INK);
-        canvas.fill(axis(x, y + height, width, 1), INK);
+        canvas.fill(area(x, y, 1, height), INK);
+        canvas.fill(area(x, y + height, width, 1), INK);
         let middle = x + width / 2;
         canvas.text(
             [middle, y + height + 32],
-            Side::Middle,
+            Anchor::Middle,
             Lettering::Label,
             self.x.label,
         );
         // Upright text above the axis reads more easily than turned text beside it.
         canvas.text(
             [x - 40, y - 16],
-            Side::Right,
+            Anchor::Start,
             Lettering::Label,
             self.y.label,
         );
     }
 
-    /// Pixel of a value.
+    /// Pixel of a point.
     pub fn pixel(&self, [x, y]: [f64; 2]) -> [f32; 2] {
         [
             self.area.x as f32 + self.x.place(x) * self.area.width as f32,
@@ -152,7 +138,7 @@ impl Plot {
         }
     }
 
-    /// A light band between two lines that share their x.
+    /// A band between two lines. Each entry is an x, and the y of the lower and of the upper line.
     pub fn draw_band(&self, canvas: &mut Canvas, band: &[[f64; 3]], colour: Colour) {
         for pair in band.windows(2) {
             let [[x0, low0, high0], [x1, low1, high1]] = [pair[0], pair[1]];
@@ -165,22 +151,23 @@ impl Plot {
                 };
                 let (top, bottom) = (between(high0, high1), between(low0, low1));
                 let bottom = bottom.min(self.area.y + self.area.height);
-                canvas.fill(
-                    Area {
-                        x,
-                        y: top,
-                        width: 1,
-                        height: bottom - top,
-                    },
-                    colour,
-                );
+                canvas.fill(area(x, top, 1, bottom - top), colour);
             }
         }
     }
 }
 
+fn area(x: i32, y: i32, width: i32, height: i32) -> Area {
+    Area {
+        x,
+        y,
+        width,
+        height,
+    }
+}
+
 fn draw_line(canvas: &mut Canvas, pixels: &[[f32; 2]], stroke: Stroke) {
-    // Dashes go on around corners.
+    // The pattern of dashes runs on around corners.
     let mut run = 0.0;
     for pair in pixels.windows(2) {
         let ([x0, y0], [x1, y1]) = (pair[0], pair[1]);
@@ -207,23 +194,15 @@ fn draw_line(canvas: &mut Canvas, pixels: &[[f32; 2]], stroke: Stroke) {
 pub fn draw_legend(canvas: &mut Canvas, [x, y]: [i32; 2], entries: &[(Stroke, String)]) {
     for (k, (stroke, name)) in entries.iter().enumerate() {
         let y = y + 20 * k as i32;
-        // Names stand on the page, not on the grid.
+        // The grid must not show behind names.
         let width = 40 + LETTER * name.chars().count() as i32;
-        canvas.fill(
-            Area {
-                x: x - 4,
-                y: y - 10,
-                width,
-                height: 20,
-            },
-            PAPER,
-        );
+        canvas.fill(area(x - 4, y - 10, width, 20), PAPER);
         let [left, right] = [[x as f32, y as f32], [(x + 26) as f32, y as f32]];
         draw_line(canvas, &[left, right], *stroke);
         if stroke.mark > 0.0 {
             canvas.disk([(x + 13) as f32, y as f32], stroke.mark, stroke.colour);
         }
-        canvas.text([x + 36, y], Side::Right, Lettering::Label, name);
+        canvas.text([x + 36, y], Anchor::Start, Lettering::Label, name);
     }
 }
 
@@ -232,7 +211,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ratios_are_equally_long_on_a_logarithmic_axis() {
+    fn equal_ratios_take_equal_lengths_on_a_logarithmic_axis() {
         let axis = Axis {
             label: "",
             scale: Scale::Logarithmic,

@@ -1,62 +1,44 @@
 //! The demo's maze with a sphere at each probe of one layer, lit by the probe alone.
 
-use super::{FigureError, Setting};
+use super::error::FigureError;
+use super::source::FigureSource;
 use crate::canvas::Canvas;
 use glam::{DVec3, Vec3};
-use mrt_editor::cli::demo::MAZE;
+use mrt_editor::document::built_in::MAZE;
 use mrt_editor::render::camera::Camera;
 use mrt_editor::render::level_view::LevelView;
 use mrt_editor::render::render;
 use mrt_editor::render::tone::auto_exposure;
-use mrt_runtime::FrameConfig;
-use mrt_runtime::Level;
 use mrt_runtime::low_level::output::probes::irradiance_from_probe;
-use mrt_runtime::{AssembleConfig, Bounces, Frame, Light, Outputs, ProbeOrder, Scene};
+use mrt_runtime::{
+    AssembleConfig, Bounces, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder, Scene,
+};
 use std::f32::consts::PI;
 
 const BOUNCES: u32 = 8;
+
 /// Metres; blocks are cubes of 1 m.
 const SPHERE_RADIUS: f32 = 0.07;
 const SPHERE_ALBEDO: f32 = 0.75;
-/// Over the floor, of a block's height: at most this.
+
+/// The layer shown is the highest of those that are at most this share of a block's height above the floor.
 const LAYER: f64 = 0.5;
+/// Pixels across and down.
 const PICTURE: [usize; 2] = [820, 448];
 
+/// A white sphere that shows a probe's light.
 struct Sphere {
     center: Vec3,
+    /// The probe's coefficients.
     light: Vec<[f32; 3]>,
 }
 
-pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
-    let level = Level::from_text(MAZE)?;
-    let scene = Scene::assemble(&level, setting.dictionary, &AssembleConfig::default())?;
-    let outputs = Outputs {
-        lightmap: true,
-        probes: Some(ProbeOrder::L2),
-        vector: false,
-    };
-    let config = FrameConfig {
-        outputs,
-        bounces: Bounces::Count(BOUNCES),
-        ..FrameConfig::default()
-    };
-    let mut frame = Frame::new(&scene, config);
-    // A warm lamp in the red arm, a cool one in the blue arm, a weak one in the far corner.
-    let lamp = |position, intensity| Light::Sphere {
-        position,
-        radius: 0.1,
-        intensity,
-    };
-    let lights = [
-        lamp(Vec3::new(0.55, 0.62, 0.5), Vec3::new(1.0, 0.82, 0.6)),
-        lamp(Vec3::new(0.6, 0.62, 2.5), Vec3::new(0.6, 0.78, 1.0)),
-        lamp(Vec3::new(4.5, 0.62, 3.5), Vec3::splat(0.5)),
-    ];
-    frame.set_lights(&lights);
-    frame.solve().require_all_lights()?;
-    let spheres =
-        spheres(&scene, &frame).ok_or(FigureError::NotInDictionary { missing: "probes" })?;
-    let shown = LevelView::new(&scene, &frame, &lights, false)?;
+pub(super) fn draw(source: &FigureSource) -> Result<Canvas, FigureError> {
+    let lights = lights();
+    let frame = solved_frame(source, &lights)?;
+    let missing = FigureError::NotInDictionary { missing: "probes" };
+    let spheres = spheres(&frame).ok_or(missing)?;
+    let shown = LevelView::new(&frame, &lights, false)?;
     let [width, height] = PICTURE.map(|k| k as i32);
     let mut canvas = Canvas::titled(
         [width + 40, height + 100],
@@ -66,12 +48,11 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             "with: colours come from the walls around it, and from blocks beyond the openings.",
         ],
     );
-    let aspect = PICTURE[0] as f32 / PICTURE[1] as f32;
     let camera = Camera::look_at(
         Vec3::new(2.5, 6.4, 6.6),
         Vec3::new(2.5, 0.2, 1.93),
         0.51,
-        aspect,
+        PICTURE[0] as f32 / PICTURE[1] as f32,
     );
     let Some(camera) = camera else {
         return Ok(canvas);
@@ -85,9 +66,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
             .min_by(|a, b| a.0.total_cmp(&b.0));
         match (sphere, shown.radiance(origin, direction)) {
             (Some((distance, sphere)), _) => {
-                let normal = (origin + distance * direction - sphere.center) / SPHERE_RADIUS;
-                let light = irradiance_from_probe(&sphere.light, normal);
-                [light * SPHERE_ALBEDO / PI, Vec3::ONE]
+                [sphere.radiance(origin + distance * direction), Vec3::ONE]
             }
             (None, Some((_, indirect))) => [indirect, Vec3::ONE],
             (None, None) => [Vec3::ZERO; 2],
@@ -97,8 +76,48 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     Ok(canvas)
 }
 
+/// A warm lamp in the red arm of the maze, a cool one in the blue arm, a weak one in the far corner.
+fn lights() -> [Light; 3] {
+    let lamp = |position, intensity| Light::Sphere {
+        position,
+        radius: 0.1,
+        intensity,
+    };
+    [
+        lamp(Vec3::new(0.55, 0.62, 0.5), Vec3::new(1.0, 0.82, 0.6)),
+        lamp(Vec3::new(0.6, 0.62, 2.5), Vec3::new(0.6, 0.78, 1.0)),
+        lamp(Vec3::new(4.5, 0.62, 3.5), Vec3::splat(0.5)),
+    ]
+}
+
+/// The demo's maze with probes.
+fn solved_frame(source: &FigureSource, lights: &[Light]) -> Result<Frame, FigureError> {
+    let level = Level::from_text(MAZE)?;
+    let scene = Scene::assemble(&level, source.dictionary, &AssembleConfig::default())?;
+    let outputs = Outputs {
+        lightmap: true,
+        probes: Some(ProbeOrder::L2),
+        vector: false,
+    };
+    let config = FrameConfig {
+        outputs,
+        bounces: Bounces::Count(BOUNCES),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
+    frame.set_lights(lights);
+    frame.solve().require_all_lights()?;
+    Ok(frame)
+}
+
 impl Sphere {
-    /// Along a ray of unit direction to the sphere's near side.
+    /// Towards any viewer, from a point of the sphere.
+    fn radiance(&self, point: Vec3) -> Vec3 {
+        let normal = (point - self.center) / SPHERE_RADIUS;
+        irradiance_from_probe(&self.light, normal) * SPHERE_ALBEDO / PI
+    }
+
+    /// Distance along a ray of unit direction to the sphere's near side; `None` if the ray misses it.
     fn distance(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
         let to = self.center - origin;
         let along = to.dot(direction);
@@ -107,8 +126,9 @@ impl Sphere {
     }
 }
 
-/// One layer of each block's probes; `None` in a scene without.
-fn spheres(scene: &Scene, frame: &Frame) -> Option<Vec<Sphere>> {
+/// One layer of each block's probes; `None` in a frame without probes.
+fn spheres(frame: &Frame) -> Option<Vec<Sphere>> {
+    let scene = frame.scene();
     let probes = frame.probes()?;
     let n = probes.per_axis();
     let kept = probes.order().coefficients();

@@ -1,6 +1,6 @@
 //! One closed room: its reduced transport, its exact solution, and a picture of its inside.
 
-use super::FigureError;
+use super::error::FigureError;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
@@ -17,7 +17,8 @@ use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
 use mrt_editor::render::camera::Camera;
-use mrt_editor::render::{Picture, render};
+use mrt_editor::render::picture::Picture;
+use mrt_editor::render::render;
 use mrt_runtime::blocks::SHAPES;
 use std::f32::consts::PI;
 
@@ -29,7 +30,7 @@ const DIRECT_SAMPLES: usize = 4;
 
 /// Canonical transport of the closed cube, with and without enrichment.
 pub struct ClosedCube {
-    /// As every preset bakes it.
+    /// With enrichment, as every preset bakes it.
     pub enriched: BlockTransport,
     /// From the light prior alone.
     pub plain: BlockTransport,
@@ -62,7 +63,7 @@ pub fn box_of(size: DVec3) -> Hexahedron {
     }
 }
 
-/// Indirect irradiance (texels x 3) after so many bounces of direct light through reduced operators T and U.
+/// Indirect irradiance (texels x 3) after a number of bounces of direct light through reduced operators T and U.
 pub fn reduced(
     [coefficients, basis]: [&Matrix<f64>; 2],
     direct: &[f64],
@@ -78,7 +79,7 @@ pub fn reduced(
             basis.view(),
             multiply(coefficients.view(), sent.view()).view(),
         );
-        // A frame clamps the sum of each pass in the same way.
+        // A frame clamps the irradiance of each pass in the same way.
         indirect = (0..direct.len())
             .map(|i| [0, 1, 2].map(|c| arriving[(i, c)].max(0.0)))
             .collect();
@@ -86,7 +87,7 @@ pub fn reduced(
     indirect
 }
 
-/// The same from the exact solver, for a room of any form.
+/// Indirect irradiance (texels x 3) after a number of bounces by the exact solver, for a room of any form.
 pub fn exact(
     warp: Hexahedron,
     resolution: usize,
@@ -131,12 +132,12 @@ pub struct OpenBox<'a> {
     pub open: Face,
     /// Texels along an edge of a wall.
     pub resolution: usize,
-    /// Of all six walls.
+    /// Of the texels of all six walls.
     pub radiance: &'a [Vec3],
 }
 
 impl OpenBox<'_> {
-    /// A picture and where it shows the room (white) or nothing (black).
+    /// A picture, and another that is white where the first shows the room and black where it shows nothing.
     pub fn picture(&self, camera: &Camera, size: [usize; 2]) -> [Picture; 2] {
         render(camera, size, 3, |origin, direction| {
             match self.seen(origin.as_dvec3(), direction.as_dvec3()) {
@@ -146,7 +147,7 @@ impl OpenBox<'_> {
         })
     }
 
-    /// Radiance of the wall that a ray from outside meets, if it enters by the open face.
+    /// Radiance of the wall that a ray from outside meets; `None` unless it enters by the open face.
     fn seen(&self, origin: DVec3, direction: DVec3) -> Option<Vec3> {
         let (mut near, mut far) = ((f64::MIN, None), (f64::MAX, None));
         for axis in (0..3).filter(|&axis| direction[axis] != 0.0) {
@@ -166,7 +167,7 @@ impl OpenBox<'_> {
         Some(self.on_wall(face, (origin + far.0 * direction) / self.size))
     }
 
-    /// Bilinear between texel centres.
+    /// Radiance at a point of a wall, bilinear between texel centres.
     fn on_wall(&self, face: Face, unit: DVec3) -> Vec3 {
         let n = self.resolution;
         let place = |x: f64| {
@@ -186,7 +187,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_wall_behind_is_seen_through_the_open_face_only() {
+    fn walls_are_seen_only_through_the_open_face() {
         let mut radiance = vec![Vec3::ZERO; 6 * 4];
         radiance[4 * Face::NegZ.index()..][..4].fill(Vec3::ONE);
         let room = OpenBox {

@@ -1,8 +1,9 @@
-//! How fast singular values fall (the paper's table 2, and what else is cut off).
+//! How fast singular values fall, of all that is truncated (the paper's table 2, and light that leaves by openings).
 
+use super::error::FigureError;
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
-use super::{FigureError, Setting};
-use crate::canvas::{Area, Canvas, Colour, Lettering, PAPER, SERIES, Side};
+use super::source::FigureSource;
+use crate::canvas::{Anchor, Area, Canvas, Colour, Lettering, PAPER, SERIES};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_dictionary::modular::paths::emission::{emission_basis, emitter_radiosity};
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};
@@ -10,25 +11,12 @@ use mrt_dictionary::progress::Progress;
 
 /// Shares of energy that are marked.
 const SHARES: [f64; 3] = [0.80, 0.90, 0.95];
+
 /// Singular values below this share of the largest are left out.
 const FLOOR: f64 = 1e-4;
 
-pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
-    let spectra = closed_cube_spectra(setting.resolution, &Progress::silent())?;
-    let mut series: Vec<(String, Spectrum)> = spectra
-        .into_iter()
-        .map(|spectrum| {
-            let name = match spectrum.matrix {
-                "L_d" => "L_d, light of lamps anywhere".to_owned(),
-                "M" => "M = F P S (64 vectors), what that light becomes".to_owned(),
-                name => format!("{name}, one bounce"),
-            };
-            (name, spectrum)
-        })
-        .collect();
-    if let Some(spectrum) = emission(setting) {
-        series.push(("light that leaves by an opening".to_owned(), spectrum));
-    }
+pub(super) fn draw(source: &FigureSource) -> Result<Canvas, FigureError> {
+    let series = series(source)?;
     let mut canvas = Canvas::titled(
         [900, 706],
         "How many modes light needs: singular values of a cube's light transport",
@@ -39,20 +27,7 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let plot = plot();
     plot.draw_axes(&mut canvas);
     for ((_, spectrum), colour) in series.iter().zip(SERIES) {
-        let values = &spectrum.singular_values;
-        let points: Vec<[f64; 2]> = (1u32..)
-            .zip(values)
-            .map(|(k, value)| [f64::from(k), value / values[0]])
-            .collect();
-        plot.draw_series(&mut canvas, &points, stroke(colour));
-        for (share, radius) in SHARES.into_iter().zip([4.0, 5.5, 7.0]) {
-            let rank = spectrum.energy_rank(share).max(1);
-            if points[rank - 1][1] >= FLOOR {
-                let at = plot.pixel(points[rank - 1]);
-                canvas.disk(at, radius, colour);
-                canvas.disk(at, radius - 2.0, PAPER);
-            }
-        }
+        draw_spectrum(&mut canvas, &plot, spectrum, colour);
     }
     let entries: Vec<(Stroke, String)> = series
         .iter()
@@ -65,12 +40,48 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
     let below = plot.area.y + plot.area.height + 62;
     canvas.text(
         [plot.area.x, below],
-        Side::Right,
+        Anchor::Start,
         Lettering::Remark,
         "modes that hold 80 / 90 / 95 % of the energy (small, middle, large ring):",
     );
     draw_legend(&mut canvas, [plot.area.x, below + 22], &entries);
     Ok(canvas)
+}
+
+/// Spectra and what they are of.
+fn series(source: &FigureSource) -> Result<Vec<(String, Spectrum)>, FigureError> {
+    let spectra = closed_cube_spectra(source.resolution, &Progress::silent())?;
+    let named = spectra.into_iter().map(|spectrum| {
+        let name = match spectrum.matrix {
+            "L_d" => "L_d, light of lamps anywhere".to_owned(),
+            "M" => "M = F P S (64 vectors), what that light becomes".to_owned(),
+            name => format!("{name}, one bounce"),
+        };
+        (name, spectrum)
+    });
+    let mut series: Vec<(String, Spectrum)> = named.collect();
+    if let Some(spectrum) = emission(source) {
+        series.push(("light that leaves by an opening".to_owned(), spectrum));
+    }
+    Ok(series)
+}
+
+/// A line through the singular values, and a ring at each of [`SHARES`].
+fn draw_spectrum(canvas: &mut Canvas, plot: &Plot, spectrum: &Spectrum, colour: Colour) {
+    let values = &spectrum.singular_values;
+    let points: Vec<[f64; 2]> = (1u32..)
+        .zip(values)
+        .map(|(k, value)| [f64::from(k), value / values[0]])
+        .collect();
+    plot.draw_series(canvas, &points, stroke(colour));
+    for (share, radius) in SHARES.into_iter().zip([4.0, 5.5, 7.0]) {
+        let rank = spectrum.energy_rank(share).max(1);
+        if points[rank - 1][1] >= FLOOR {
+            let at = plot.pixel(points[rank - 1]);
+            canvas.disk(at, radius, colour);
+            canvas.disk(at, radius - 2.0, PAPER);
+        }
+    }
 }
 
 fn stroke(colour: Colour) -> Stroke {
@@ -107,10 +118,11 @@ fn plot() -> Plot {
     }
 }
 
-/// Singular values of what the dictionary's shapes send through their openings; `None` if it does not hold it.
-fn emission(setting: &Setting) -> Option<Spectrum> {
-    let resolution = setting.dictionary.resolution;
-    let sent: Vec<Matrix<f64>> = setting
+/// Singular values of the light that the dictionary's shapes send through their openings; `None` if the dictionary does not
+/// hold it.
+fn emission(source: &FigureSource) -> Option<Spectrum> {
+    let resolution = source.dictionary.resolution;
+    let sent: Vec<Matrix<f64>> = source
         .dictionary
         .shapes
         .iter()

@@ -1,10 +1,11 @@
-//! Warped blocks: error against stretch, and a long hall (the paper's figure 12), by the three levels of
-//! transport that a block may have.
+//! Warped blocks: error against stretch, and a long hall (the paper's figure 12), by the three levels of transport that a
+//! block may have.
 
+use super::error::FigureError;
 use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::room::{ClosedCube, MODES, OpenBox, box_of, exact, radiance, reduced, spread};
-use super::{FigureError, Setting};
-use crate::canvas::{Area, Canvas, Lettering, SERIES, Side};
+use super::source::FigureSource;
+use crate::canvas::{Anchor, Area, Canvas, Lettering, SERIES};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sampling::hash;
@@ -19,12 +20,15 @@ use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathe
 use mrt_editor::render::camera::Camera;
 use mrt_editor::render::tone::auto_exposure;
 
+/// The levels of transport.
 const LEVELS: [&str; 3] = [
     "canonical operators as they are",
     "re-gathered on the warped walls",
     "rebuilt for the warped walls",
 ];
+/// Lengths of boxes that are 1 high and 1 wide.
 const STRETCHES: [f64; 8] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0];
+/// Lamps over which an error is the median.
 const LIGHTS: u32 = 40;
 
 /// The hall: a cube stretched along z, a lamp a tenth from its end.
@@ -33,34 +37,36 @@ const HALL_LIGHT: DVec3 = DVec3::new(0.4, 0.55, 0.1);
 const HALL_ALBEDO: [f64; 3] = [0.6; 3];
 const HALL_BOUNCES: usize = 20;
 
+/// Pixels of a picture of the hall, across and down, and from one to the next.
 const STRIP: [usize; 2] = [800, 200];
+const STRIP_STEP: i32 = STRIP[1] as i32 + 32;
 
-pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
-    let cube = ClosedCube::new(setting.resolution)?;
+pub(super) fn draw(source: &FigureSource) -> Result<Canvas, FigureError> {
+    let cube = ClosedCube::new(source.resolution)?;
     let top = 430;
-    let step = STRIP[1] as i32 + 32;
     let mut canvas = Canvas::titled(
-        [900, top + 42 + 4 * step],
+        [900, top + 42 + 4 * STRIP_STEP],
         "Blocks that are not cubes",
         &[
             "First bounce in closed boxes of 1:1:a, against closed-form transport between their texels; median of 40 lamps.",
         ],
     );
-    draw_errors(&mut canvas, setting, &cube);
+    draw_errors(&mut canvas, source.resolution, &cube);
     canvas.text(
         [20, top + 6],
-        Side::Right,
+        Anchor::Start,
         Lettering::Heading,
         "A hall of 1:1:4, its lamp at the left end: indirect light only, one exposure",
     );
-    draw_hall(&mut canvas, [50, top + 42], step, setting, &cube)?;
+    draw_hall(&mut canvas, [50, top + 42], source.resolution, &cube)?;
     Ok(canvas)
 }
 
-/// A stretched closed block with (T, U) of each level.
+/// A stretched closed block.
 struct Stretched {
     walls: WarpedWalls,
     bounce: Matrix<f64>,
+    /// T and U of each level of transport.
     levels: [[Matrix<f64>; 2]; 3],
     light_radius: f64,
 }
@@ -92,7 +98,7 @@ impl Stretched {
         }
     }
 
-    /// Median over lamps of the relative L2 error of the first bounce by area, %.
+    /// For each level of transport, the median over lamps of the relative L2 error of the first bounce, weighted by area, %.
     fn errors(&self) -> [f64; 3] {
         let direct = warped_direct_samples(&self.walls, &lamps(), self.light_radius);
         let truth = multiply(self.bounce.view(), direct.view());
@@ -108,7 +114,7 @@ impl Stretched {
     }
 }
 
-/// Random places a tenth or more from every wall.
+/// Random places in the unit cube, a tenth or more from every wall.
 fn lamps() -> Vec<DVec3> {
     let random = |index| f64::from(hash(1, index)) / 4_294_967_296.0;
     (0..LIGHTS)
@@ -116,6 +122,7 @@ fn lamps() -> Vec<DVec3> {
         .collect()
 }
 
+/// Relative L2 error, weighted by area.
 fn relative(areas: &[f64], found: &[f64], truth: &[f64]) -> f64 {
     let (mut miss, mut size) = (0.0, 0.0);
     for ((f, t), area) in found.iter().zip(truth).zip(areas) {
@@ -125,7 +132,7 @@ fn relative(areas: &[f64], found: &[f64], truth: &[f64]) -> f64 {
     (miss / size).sqrt()
 }
 
-fn draw_errors(canvas: &mut Canvas, setting: &Setting, cube: &ClosedCube) {
+fn draw_errors(canvas: &mut Canvas, resolution: usize, cube: &ClosedCube) {
     let tick = |value: f64, name: String| (value, name);
     let plot = Plot {
         area: Area {
@@ -150,8 +157,8 @@ fn draw_errors(canvas: &mut Canvas, setting: &Setting, cube: &ClosedCube) {
         },
     };
     plot.draw_axes(canvas);
-    let measured = STRETCHES
-        .map(|a| Stretched::new(DVec3::new(1.0, 1.0, a), cube, setting.resolution).errors());
+    let measured =
+        STRETCHES.map(|a| Stretched::new(DVec3::new(1.0, 1.0, a), cube, resolution).errors());
     let strokes = [SERIES[1], SERIES[4], SERIES[0]].map(|colour| Stroke {
         colour,
         is_dashed: false,
@@ -173,33 +180,15 @@ fn draw_errors(canvas: &mut Canvas, setting: &Setting, cube: &ClosedCube) {
     draw_legend(canvas, [plot.area.x + 30, plot.area.y + 20], &legend);
 }
 
+/// The hall as the exact solution and the three levels of transport light it, below one another.
 fn draw_hall(
     canvas: &mut Canvas,
     [x, y]: [i32; 2],
-    step: i32,
-    setting: &Setting,
+    resolution: usize,
     cube: &ClosedCube,
 ) -> Result<(), FigureError> {
-    let resolution = setting.resolution;
-    let hall = Stretched::new(HALL, cube, resolution);
     let albedo = spread([HALL_ALBEDO; 6], resolution);
-    let light = PointLight {
-        position: HALL_LIGHT * HALL,
-        intensity: 1.0,
-        radius: hall.light_radius,
-    };
-    let truth = exact(box_of(HALL), resolution, &light, &albedo, HALL_BOUNCES)?;
-    let direct = warped_direct_samples(&hall.walls, &[HALL_LIGHT], hall.light_radius);
-    let mut strips = vec![("exact".to_owned(), truth.clone())];
-    let flat = |signal: &[[f64; 3]]| signal.iter().map(|rgb| rgb[1]).collect::<Vec<_>>();
-    for ([t, u], name) in hall.levels.iter().zip(LEVELS) {
-        let found = reduced([t, u], direct.column(0), &albedo, HALL_BOUNCES);
-        let error = relative(&hall.walls.areas, &flat(&found), &flat(&truth));
-        strips.push((
-            format!("{name}: relative L2 error {:.0} %", 100.0 * error),
-            found,
-        ));
-    }
+    let strips = strips(resolution, cube, &albedo)?;
     // From the side, the long wall x = 0 left out; the lit end is on the left.
     let middle = (0.5 * HALL).as_vec3();
     let aspect = STRIP[0] as f32 / STRIP[1] as f32;
@@ -207,24 +196,57 @@ fn draw_hall(
     let Some(camera) = camera else {
         return Ok(());
     };
-    let pictures: Vec<_> = strips
-        .iter()
-        .map(|(_, irradiance)| {
-            let radiance = radiance(&albedo, irradiance);
-            let room = OpenBox {
-                size: HALL,
-                open: Face::NegX,
-                resolution,
-                radiance: &radiance,
-            };
-            room.picture(&camera, STRIP)
-        })
-        .collect();
+    let photograph = |strip: &Strip| {
+        let room = OpenBox {
+            size: HALL,
+            open: Face::NegX,
+            resolution,
+            radiance: &radiance(&albedo, &strip.irradiance),
+        };
+        room.picture(&camera, STRIP)
+    };
+    let pictures: Vec<_> = strips.iter().map(photograph).collect();
     let exposure = auto_exposure(&[&pictures[0][0]]);
-    for (k, ((name, _), [picture, shown])) in strips.iter().zip(&pictures).enumerate() {
-        let y = y + k as i32 * step;
-        canvas.text([x, y - 12], Side::Right, Lettering::Label, name);
+    for (k, (strip, [picture, shown])) in (0..).zip(strips.iter().zip(&pictures)) {
+        let y = y + k * STRIP_STEP;
+        canvas.text([x, y - 12], Anchor::Start, Lettering::Label, &strip.name);
         canvas.picture([x, y], picture, shown, exposure);
     }
     Ok(())
+}
+
+/// The hall's indirect irradiance, by texel, and how it was found.
+struct Strip {
+    name: String,
+    irradiance: Vec<[f64; 3]>,
+}
+
+fn strips(
+    resolution: usize,
+    cube: &ClosedCube,
+    albedo: &[[f64; 3]],
+) -> Result<Vec<Strip>, FigureError> {
+    let hall = Stretched::new(HALL, cube, resolution);
+    let light = PointLight {
+        position: HALL_LIGHT * HALL,
+        intensity: 1.0,
+        radius: hall.light_radius,
+    };
+    let truth = exact(box_of(HALL), resolution, &light, albedo, HALL_BOUNCES)?;
+    let direct = warped_direct_samples(&hall.walls, &[HALL_LIGHT], hall.light_radius);
+    let green = |signal: &[[f64; 3]]| signal.iter().map(|rgb| rgb[1]).collect::<Vec<_>>();
+    let found = hall.levels.iter().zip(LEVELS).map(|([t, u], name)| {
+        let irradiance = reduced([t, u], direct.column(0), albedo, HALL_BOUNCES);
+        let error = relative(&hall.walls.areas, &green(&irradiance), &green(&truth));
+        Strip {
+            name: format!("{name}: relative L2 error {:.0} %", 100.0 * error),
+            irradiance,
+        }
+    });
+    let found: Vec<Strip> = found.collect();
+    let exact = Strip {
+        name: "exact".to_owned(),
+        irradiance: truth,
+    };
+    Ok(std::iter::once(exact).chain(found).collect())
 }

@@ -1,107 +1,24 @@
 //! The frame, as it is measured: everything in the benchmark that knows how `mrt-runtime` is called.
 
-use super::reference::Receiver;
-use super::setting::{ALBEDO, Setting};
+use super::frame_variant::{FrameVariant, assemble_config};
+use super::lit_maze::{ALBEDO, LitMaze};
+use super::sampled_texel::SampledTexel;
 use super::timing::Timed;
-use mrt_core::simd::SimdLevel;
-use mrt_core::storage::Storage;
 use mrt_runtime::executor::{Executor, Rayon, Serial};
 use mrt_runtime::{
-    AssembleConfig, AssembleError, BlockIndex, Bounces, Coupling, Dictionary, Frame, FrameConfig,
-    Light, LightId, Scene, SkippedLight,
+    AssembleConfig, AssembleError, BlockIndex, Bounces, Frame, FrameConfig, Light, LightId, Scene,
+    SkippedLight,
 };
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::Arc;
 
-/// How a scene's operators are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Packing {
-    /// `f32` within blocks and `f16` from block to block: what games get unless they ask.
-    Mixed,
-    /// Four bytes a number, exact.
-    F32,
-    /// Two bytes a number.
-    F16,
-    /// One byte a number.
-    Int8,
-}
-
-impl Packing {
-    /// "mixed", "f32", "f16" or "int8".
-    pub fn name(self) -> &'static str {
-        match self {
-            Packing::Mixed => "mixed",
-            Packing::F32 => Storage::F32.name(),
-            Packing::F16 => Storage::F16.name(),
-            Packing::Int8 => Storage::Int8.name(),
-        }
-    }
-
-    /// Storage within blocks and from block to block.
-    fn storages(self) -> [Storage; 2] {
-        match self {
-            Packing::Mixed => {
-                let usual = AssembleConfig::default();
-                [usual.shape_storage, usual.transport_storage]
-            }
-            Packing::F32 => [Storage::F32; 2],
-            Packing::F16 => [Storage::F16; 2],
-            Packing::Int8 => [Storage::Int8; 2],
-        }
-    }
-}
-
-/// One way to compute a frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Variant<'a> {
-    /// What it is called: a preset, or another dictionary.
-    pub preset: &'a str,
-    /// The operators.
-    pub dictionary: &'a Dictionary,
-    /// How they are stored.
-    pub storage: Packing,
-    /// How light goes from block to block.
-    pub coupling: Coupling,
-    /// Instructions.
-    pub simd: SimdLevel,
-    /// Threads.
-    pub threads: usize,
-}
-
-/// Bytes that scenes of the benchmark may take: 10,000 blocks with the quality preset take more than 2 GiB, and what
-/// they are compared with several times as much.
-const MAX_BYTES: usize = 4 << 30;
-
-/// Settings for assembling with a coupling.
-pub fn assemble_config(coupling: Coupling) -> AssembleConfig {
-    AssembleConfig {
-        coupling,
-        max_bytes: MAX_BYTES,
-        ..AssembleConfig::default()
-    }
-}
-
-impl Variant<'_> {
-    /// Such as "standard/avx2/t1", with the storage unless it is mixed and the coupling unless it is the table.
-    pub fn name(&self) -> String {
-        let mut name = format!("{}/{}/t{}", self.preset, self.simd.name(), self.threads);
-        if self.storage != Packing::Mixed {
-            name = format!("{name}/{}", self.storage.name());
-        }
-        if self.coupling != Coupling::Table {
-            name = format!("{name}/lightfield");
-        }
-        name
-    }
-}
-
 /// Why a variant cannot be measured.
 #[derive(Debug, thiserror::Error)]
-pub enum OursError {
+pub enum TimedFrameError {
     /// Level and dictionary do not fit.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
-    /// The lights are refused.
+    /// A light does not shine.
     #[error(transparent)]
     Skipped(#[from] SkippedLight),
     /// The system gives no threads.
@@ -109,10 +26,13 @@ pub enum OursError {
     Threads(#[from] ThreadPoolBuildError),
 }
 
-impl OursError {
+impl TimedFrameError {
     /// True where the level needs more memory than a benchmark may take.
     pub fn is_size(&self) -> bool {
-        matches!(self, OursError::Assemble(AssembleError::TooLarge { .. }))
+        matches!(
+            self,
+            TimedFrameError::Assemble(AssembleError::TooLarge { .. })
+        )
     }
 }
 
@@ -128,16 +48,17 @@ pub const LIGHT_STAGES: [usize; 4] = [0, 1, 2, 3];
 /// A whole frame.
 pub const ALL_STAGES: [usize; 5] = [0, 1, 2, 3, 4];
 
-/// What a stage has to do at least.
+/// The least that a stage has to do.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
-    /// Operations of the products that are made, a product and a sum being two; 0 for stages that are no product.
+    /// Operations of the products that are made, a multiplication and an addition being two; 0 for stages without
+    /// products.
     pub flops: f64,
-    /// Bytes that it reads and writes, each once.
+    /// Bytes that are read and written, each once.
     pub bytes: f64,
 }
 
-/// Exactly so many threads, none of which is the caller's: a frame is best called from one of them.
+/// A fixed number of threads, none of which is the caller's; a frame is best called from one of them.
 #[derive(Clone, Debug)]
 struct Pool(Arc<ThreadPool>);
 
@@ -154,19 +75,19 @@ impl Executor for Pool {
 /// What happens between two frames that are timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
-    /// Everything is forgotten, so that a frame does all that it can have to do.
+    /// Everything is forgotten, so that a frame computes everything that is lit.
     Everything,
-    /// The first light moves, and what does not depend on it is kept.
+    /// The first light moves; light that does not depend on it is kept.
     OneLight,
-    /// All lights move, which leaves nothing of what they light, and blocks that stay dark as they are.
+    /// All lights move: all blocks that they light are computed, and blocks that stay dark are kept.
     AllLights,
 }
 
-/// How far a moving light goes, in blocks: there and back in turns, always in its own block.
+/// How far a moving light goes, in blocks. It moves there and back in turns and never leaves its block.
 const STEP: f32 = 0.05;
 
 /// A scene and its frame.
-pub struct Ours {
+pub struct TimedFrame {
     /// The scene.
     pub scene: Scene,
     config: FrameConfig,
@@ -178,19 +99,19 @@ pub struct Ours {
     pool: Option<Pool>,
 }
 
-impl Ours {
+impl TimedFrame {
     /// Assembles a level, and solves a first frame.
     ///
     /// # Errors
-    /// [`OursError`].
-    pub fn new(setting: &Setting, variant: &Variant) -> Result<Self, OursError> {
+    /// [`TimedFrameError`].
+    pub fn new(maze: &LitMaze, variant: &FrameVariant) -> Result<Self, TimedFrameError> {
         let [shape_storage, transport_storage] = variant.storage.storages();
         let config = AssembleConfig {
             shape_storage,
             transport_storage,
             ..assemble_config(variant.coupling)
         };
-        let scene = Scene::assemble(&setting.level, variant.dictionary, &config)?;
+        let scene = Scene::assemble(&maze.level, variant.dictionary, &config)?;
         let pool = match variant.threads {
             0 | 1 => None,
             threads => {
@@ -208,13 +129,13 @@ impl Ours {
             bounces: Bounces::Count(1),
             ..FrameConfig::default()
         };
-        let (frame, ids) = first_frame(&scene, &config, &setting.lights)?;
+        let (frame, ids) = first_frame(&scene, &config, &maze.lights)?;
         Ok(Self {
             scene,
             config,
             frame,
             ids,
-            lights: setting.lights.clone(),
+            lights: maze.lights.clone(),
             motion: Motion::Everything,
             is_moved: false,
             pool,
@@ -226,11 +147,11 @@ impl Ours {
         Self { motion, ..self }
     }
 
-    /// The same with a [`FrameConfig::tolerance`] of so much of the brightest indirect irradiance.
+    /// The same with a [`FrameConfig::tolerance`] of this share of the brightest indirect irradiance.
     ///
     /// # Errors
-    /// [`OursError::Frame`].
-    pub fn with_tolerance(mut self, share: f32) -> Result<Self, OursError> {
+    /// [`TimedFrameError::Skipped`].
+    pub fn with_tolerance(mut self, share: f32) -> Result<Self, TimedFrameError> {
         let brightest = self.indirect().into_iter().fold(0.0, f32::max);
         let config = FrameConfig {
             tolerance: share * brightest,
@@ -241,20 +162,20 @@ impl Ours {
         Ok(self)
     }
 
-    /// What [`FrameConfig::tolerance`] says that a texel errs by after one bounce, with the albedo of the benchmark's
-    /// levels.
+    /// The largest error of a texel that [`FrameConfig::tolerance`] states for one bounce, W/m², with the albedo of the
+    /// benchmark's levels.
     pub fn stated_error(&self) -> f64 {
         f64::from(self.config.tolerance * (1.0 + ALBEDO.max_element()))
     }
 
-    /// Lets moving lights be where they go to, and not where they began.
+    /// Moves lights that are where they began to where they go.
     pub fn go(&mut self) {
         if !self.is_moved {
             self.run();
         }
     }
 
-    /// The largest difference of a texel's indirect irradiance from another frame's of the same level.
+    /// The largest difference of a texel's indirect irradiance from that in another frame of the same level, W/m².
     pub fn largest_difference(&self, other: &Self) -> f64 {
         let (a, b) = (self.indirect(), other.indirect());
         let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
@@ -287,17 +208,28 @@ impl Ours {
         copy
     }
 
-    /// Indirect irradiance of the last frame.
-    pub fn irradiance(&self, receivers: &[Receiver]) -> Vec<[f64; 3]> {
-        let at = |receiver: &Receiver| {
-            let texel = texel_of(&self.scene, receiver);
+    /// Indirect irradiance of the last frame at some texels, W/m².
+    pub fn irradiance(&self, texels: &[SampledTexel]) -> Vec<[f64; 3]> {
+        let at = |sampled: &SampledTexel| {
+            let texel = texel_of(&self.scene, sampled);
             let indirect = self
                 .frame
-                .indirect_at(BlockIndex::new(receiver.block), texel);
-            let indirect = indirect.expect("receivers are texels of the scene");
+                .indirect_at(BlockIndex::new(sampled.block), texel);
+            let indirect = indirect.expect("sampled texels are texels of the scene");
             indirect.to_array().map(f64::from)
         };
-        receivers.iter().map(at).collect()
+        texels.iter().map(at).collect()
+    }
+
+    /// Texels along an edge of a wall.
+    pub fn resolution(&self) -> usize {
+        self.scene.level.resolution
+    }
+
+    /// Modes `k_b` of the block that has most.
+    pub fn modes(&self) -> usize {
+        let blocks = self.scene.blocks.iter();
+        blocks.map(|b| b.coefficients.len()).max().unwrap_or(0)
     }
 
     /// Blocks that indirect light reached in the last frame.
@@ -327,15 +259,15 @@ impl Ours {
         let scene = &self.scene;
         let layout = &scene.layout;
         let [direct, coefficients, indirect] = self.lit();
-        let of_lit = |is_lit: &[bool], of_place: &dyn Fn(usize) -> f64| -> f64 {
-            let lit = (0..layout.block_count()).filter(|&place| is_lit[place]);
-            lit.map(of_place).sum()
+        let of_lit = |is_lit: &[bool], of_rank: &dyn Fn(usize) -> f64| -> f64 {
+            let lit = (0..layout.block_count()).filter(|&rank| is_lit[rank]);
+            lit.map(of_rank).sum()
         };
-        let slots = |place: usize| (RGB_BYTES * layout.slots[place].len()) as f64;
+        let slots = |rank: usize| (RGB_BYTES * layout.slots[rank].len()) as f64;
         let rows = |_| (RGB_BYTES * scene.rows.count) as f64;
         let products = |stage: usize| {
-            move |place: usize| {
-                let shape = &scene.shapes[layout.shapes[place] as usize];
+            move |rank: usize| {
+                let shape = &scene.shapes[layout.shapes[rank] as usize];
                 2.0 * shape.multiply_adds()[stage] as f64
             }
         };
@@ -376,7 +308,7 @@ impl Ours {
         ]
     }
 
-    /// By place: whether there are direct light, coefficients b and indirect light.
+    /// By rank of a block: whether it has direct light, coefficients b and indirect light.
     fn lit(&self) -> [Vec<bool>; 3] {
         let mut coefficients = Vec::new();
         self.frame.copy_coefficients_to(&mut coefficients);
@@ -409,22 +341,22 @@ fn first_frame(
 /// Bytes of three numbers.
 const RGB_BYTES: usize = 12;
 
-/// Index of a receiver's texel in its block.
-pub fn texel_of(scene: &Scene, receiver: &Receiver) -> usize {
-    let Receiver {
+/// Index of a sampled texel in its block.
+pub fn texel_of(scene: &Scene, sampled: &SampledTexel) -> usize {
+    let SampledTexel {
         block,
         face,
         row,
         column,
         ..
-    } = *receiver;
+    } = *sampled;
     scene
         .level
         .level_texel(BlockIndex::new(block), face, row, column)
-        .expect("receivers are texels of the level's walls at the scene's resolution")
+        .expect("sampled texels are texels of the level's walls at the scene's resolution")
 }
 
-impl Timed for Ours {
+impl Timed for TimedFrame {
     fn run(&mut self) -> Vec<f64> {
         match self.motion {
             Motion::Everything => self.frame.forget(),

@@ -5,26 +5,37 @@ use mrt_core::lighting::sampling::hash;
 use mrt_runtime::blocks::maze;
 use mrt_runtime::{Level, Light};
 
-/// Of all mazes.
+/// Seed of all mazes.
 const SEED: u64 = 41;
 
-/// Of all walls: three channels that differ.
+/// Albedo of all walls: three channels that differ.
 pub const ALBEDO: Vec3 = Vec3::new(0.8, 0.6, 0.4);
 
-/// Blocks that share a light, and lights at most: direct light asks every light at every texel.
+/// Blocks for each light by default, and lights by default at most: direct light asks every light at every texel.
 const BLOCKS_PER_LIGHT: usize = 10;
 const MOST_LIGHTS: usize = 16;
 
-/// Of lights, in blocks: what the lights of a dictionary's prior have.
+/// Radius of lights, in blocks: that of the lights of a dictionary's prior.
 const RADIUS: f32 = 0.1;
 
-/// Of lights: how far from the middle of a block, in blocks, which leaves a quarter of one to the walls.
+/// How far lights may be from the middle of a block along each axis, in blocks: a quarter of a block from the walls.
 const JITTER: f64 = 0.25;
+
+/// A sphere light of a maze.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MazeLamp {
+    /// Centre, metres.
+    pub position: Vec3,
+    /// Metres.
+    pub radius: f32,
+    /// Radiant intensity, W/sr.
+    pub intensity: Vec3,
+}
 
 /// A lit maze.
 #[derive(Clone, Debug)]
-pub struct Setting {
-    /// Such as "maze41".
+pub struct LitMaze {
+    /// A name such as "maze41".
     pub name: String,
     /// The maze.
     pub level: Level,
@@ -32,8 +43,8 @@ pub struct Setting {
     pub lights: Vec<Light>,
 }
 
-impl Setting {
-    /// A maze of so many blocks with so many lights, or one for each ten blocks, at most 16.
+impl LitMaze {
+    /// A maze of this number of blocks, with this number of lights or, by default, one for each ten blocks, 1 to 16.
     pub fn new(blocks: usize, lights: Option<usize>) -> Self {
         let level = maze(blocks, ALBEDO, SEED);
         let count = level.blocks.len();
@@ -43,7 +54,7 @@ impl Setting {
         Self::with_lights_in(format!("maze{blocks}"), level, &lit.collect::<Vec<_>>())
     }
 
-    /// A maze of so many blocks, with lights in those that fewest openings part from the one in the middle.
+    /// A maze of this number of blocks, with lights in the blocks that are the fewest openings away from the middle one.
     pub fn together(blocks: usize, lights: usize) -> Self {
         let level = maze(blocks, ALBEDO, SEED);
         let neighbours = level.neighbours();
@@ -63,7 +74,8 @@ impl Setting {
         Self::with_lights_in(format!("maze{blocks}"), level, &lit)
     }
 
-    /// So many mazes side by side, of which light reaches one: as many blocks as [`Setting::together`] has lights.
+    /// A number of mazes side by side that are not joined; each block of the first has a light, and no light reaches the
+    /// others.
     pub fn islands(mazes: usize, blocks: usize) -> Self {
         let one = maze(blocks, ALBEDO, SEED);
         let side = (mazes as f64).sqrt().ceil() as usize;
@@ -110,20 +122,25 @@ impl Setting {
         }
     }
 
-    /// Position, radius and intensity of each light.
-    pub fn spheres(&self) -> Vec<(Vec3, f32, Vec3)> {
-        let sphere = |light: &Light| match *light {
+    /// The lights once more, for other ways to light the maze.
+    pub fn lamps(&self) -> Vec<MazeLamp> {
+        let lamp = |light: &Light| match *light {
             Light::Sphere {
                 position,
                 radius,
                 intensity,
-            } => Some((position, radius, intensity)),
+            } => Some(MazeLamp {
+                position,
+                radius,
+                intensity,
+            }),
             _ => None,
         };
-        self.lights.iter().filter_map(sphere).collect()
+        self.lights.iter().filter_map(lamp).collect()
     }
 }
 
+/// Intensities that lights take in turn, W/sr.
 const COLOURS: [Vec3; 4] = [
     Vec3::new(1.0, 0.9, 0.8),
     Vec3::new(0.6, 0.8, 1.0),
@@ -138,29 +155,29 @@ mod tests {
     #[test]
     fn each_light_is_in_a_block_of_its_own() {
         for blocks in [1, 5, 41, 300] {
-            let setting = Setting::new(blocks, None);
-            let mut lit: Vec<usize> = setting
-                .spheres()
+            let maze = LitMaze::new(blocks, None);
+            let mut lit: Vec<usize> = maze
+                .lamps()
                 .iter()
-                .filter_map(|(position, ..)| {
-                    let mut all = setting.level.blocks.iter();
-                    all.position(|b| b.warp.contains(position.as_dvec3(), 0.0))
+                .filter_map(|lamp| {
+                    let mut all = maze.level.blocks.iter();
+                    all.position(|b| b.warp.contains(lamp.position.as_dvec3(), 0.0))
                 })
                 .collect();
-            assert_eq!(lit.len(), setting.lights.len());
+            assert_eq!(lit.len(), maze.lights.len());
             lit.dedup();
-            assert_eq!(lit.len(), setting.lights.len());
+            assert_eq!(lit.len(), maze.lights.len());
         }
-        assert_eq!(Setting::new(41, None).lights.len(), 4);
-        assert_eq!(Setting::new(5, Some(9)).lights.len(), 5);
-        assert_eq!(Setting::together(10, 10).lights.len(), 10);
+        assert_eq!(LitMaze::new(41, None).lights.len(), 4);
+        assert_eq!(LitMaze::new(5, Some(9)).lights.len(), 5);
+        assert_eq!(LitMaze::together(10, 10).lights.len(), 10);
     }
 
     #[test]
     fn lights_together_are_few_openings_apart() {
-        let positions = Setting::together(400, 10).spheres();
-        assert_eq!(positions.len(), 10);
-        let far = |a: &(Vec3, f32, Vec3)| positions.iter().any(|b| a.0.distance(b.0) > 12.0);
-        assert!(!positions.iter().any(far));
+        let lamps = LitMaze::together(400, 10).lamps();
+        assert_eq!(lamps.len(), 10);
+        let is_far = |a: &MazeLamp| lamps.iter().any(|b| a.position.distance(b.position) > 12.0);
+        assert!(!lamps.iter().any(is_far));
     }
 }
