@@ -65,7 +65,7 @@ impl<'a> Lightmap<'a> {
     }
 
     /// Writes a tile with a shared exponent, row by row: `size`² pixels of `RGB9E5`. Values above 65,408 become that; the
-    /// error is at most 1/1024 of a pixel's largest channel. What `out` held is replaced; it stays empty for a tile that is
+    /// error is at most 1/511 of a pixel's largest channel. What `out` held is replaced; it stays empty for a tile that is
     /// not in the image.
     pub fn write_rgb9e5(&self, tile: Tile, out: &mut Vec<u32>) {
         out.clear();

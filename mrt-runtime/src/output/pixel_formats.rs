@@ -13,13 +13,18 @@ pub(crate) fn f16_bits(x: f32) -> u16 {
 
 /// Three numbers with 9 bits each and an exponent in common, as Vulkan's `E5B9G9R9_UFLOAT_PACK32` and OpenGL's `RGB9_E5`
 /// have them (Khronos data format specification, section 10.6). Negative numbers and NaN become 0, numbers above 65,408
-/// become that; the error is at most 1/1024 of the largest of the three.
+/// become that; the error is at most 1/511 of the largest of the three.
 pub(crate) fn rgb9e5(rgb: [f32; 3]) -> u32 {
     const MANTISSA_BITS: i32 = 9;
     const BIAS: i32 = 15;
     const LARGEST: f32 = 65_408.0;
-    // `max` turns NaN into 0.
-    let rgb = rgb.map(|x| x.max(0.0).min(LARGEST));
+    let rgb = rgb.map(|x| {
+        if x.is_nan() {
+            0.0
+        } else {
+            x.clamp(0.0, LARGEST)
+        }
+    });
     let most = rgb[0].max(rgb[1]).max(rgb[2]);
     let floor_log2 = (most.to_bits() >> 23) as i32 - 127;
     let mut exponent = floor_log2.max(-BIAS - 1) + 1 + BIAS;
@@ -57,7 +62,7 @@ mod tests {
             let rgb = rgb.map(|x: f32| x.min(65_408.0));
             let largest = f64::from(rgb[0].max(rgb[1]).max(rgb[2]));
             // Below 2^-15 the exponent cannot fall any further: a step is 2^-24.
-            let bound = (largest / 1022.0).max(2f64.powi(-25));
+            let bound = (largest / 511.0).max(2f64.powi(-25));
             for (x, found) in rgb.into_iter().zip(decode(rgb9e5(rgb))) {
                 assert!((f64::from(x) - found).abs() <= bound, "{rgb:?}: {found}");
             }

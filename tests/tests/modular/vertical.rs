@@ -82,9 +82,9 @@ fn by_place(scene: &Scene, signal: &[[f32; 3]], turn: CubeRotation) -> HashMap<[
     (0..scene.texel_count())
         .map(|texel| {
             let middle = DVec3::splat(0.5);
-            let position = position_of(&scene, texel).as_dvec3() - middle;
+            let position = position_of(scene, texel).as_dvec3() - middle;
             let [a, b, c] = whole(turn.direction(position));
-            let [d, e, f] = whole(turn.direction(normal_of(&scene, texel).as_dvec3()));
+            let [d, e, f] = whole(turn.direction(normal_of(scene, texel).as_dvec3()));
             ([a, b, c, d, e, f], signal[texel])
         })
         .collect()
