@@ -5,7 +5,7 @@ use glam::Vec3;
 use mrt_core::simd::folded::{Albedo, Basis, Reflected, fold, unfold};
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows, dot_unlike_rows};
 use mrt_core::simd::tiles::{
-    CHANNELS, Element, Finish, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
+    CHANNELS, Finish, HALF_TILE, PackedNumber, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
 };
 use mrt_core::simd::{Aligned, Kernel, Lanes, WIDEST};
 use std::ops::Range;
@@ -114,7 +114,7 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
 }
 
 #[inline(always)]
-fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
+fn coefficients<L: Lanes, E: PackedNumber>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
     let stride = block.shape.folding.stride;
     let place = block.coefficients.len() / CHANNELS;
     let albedo = block.later().unwrap_or([1.0; CHANNELS]);
@@ -264,7 +264,7 @@ impl Kernel for IndirectOf<'_> {
 }
 
 #[inline(always)]
-fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
+fn arrive<L: Lanes, E: PackedNumber>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
     let transport = block.transport;
     let stride = block.joint.len() / CHANNELS;
     let own = CHANNELS * stride * block.block;
@@ -396,7 +396,7 @@ fn run_of(entries: &[TransportEntry]) -> Option<(Range<usize>, usize)> {
 }
 
 #[inline(always)]
-fn sum_terms<'a, L: Lanes, E: Element>(
+fn sum_terms<'a, L: Lanes, E: PackedNumber>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Finish<'_>,
@@ -410,7 +410,7 @@ fn sum_terms<'a, L: Lanes, E: Element>(
 }
 
 #[inline(always)]
-fn expand<L: Lanes, E: Element, const GROUP: usize>(
+fn expand<L: Lanes, E: PackedNumber, const GROUP: usize>(
     l: L,
     joint: &[E],
     block: &mut IndirectOf<'_>,
@@ -484,7 +484,7 @@ impl Kernel for Expand<'_> {
 }
 
 #[inline(always)]
-fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
+fn expand_rows<L: Lanes, E: PackedNumber>(l: L, values: &[E], job: &mut Expand<'_>) {
     let basis = job.basis;
     let columns = basis.columns.get(0..basis.columns.len());
     let count = columns.indices().len();
