@@ -8,7 +8,7 @@
 mod folder;
 mod parse;
 
-pub use folder::{oracle_folder, oracle_folder_or_report};
+pub use folder::{ground_truth_folder, oracle_folder};
 pub use parse::read;
 
 use crate::geometry::cube::Face;
