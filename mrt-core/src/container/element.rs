@@ -3,10 +3,10 @@
 use bytemuck::AnyBitPattern;
 use half::f16;
 
-/// Type of a section's elements; the discriminant is the code in the file.
+/// Type of a section's elements. The discriminant is the code in the file, so it never changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ElementType {
-    /// Bytes with no meaning here.
+    /// Bytes that the container does not interpret.
     Bytes = 0,
     /// UTF-8.
     Text = 1,
@@ -39,7 +39,7 @@ impl ElementType {
         ElementType::F16,
     ];
 
-    /// Bytes an element.
+    /// Bytes an element takes.
     pub const fn size(self) -> usize {
         match self {
             ElementType::Bytes | ElementType::Text | ElementType::I8 => 1,
@@ -51,18 +51,18 @@ impl ElementType {
 }
 
 /// A number that sections hold: `i8`, `u16`, `u32`, `u64`, `f16`, `f32` or `f64`.
-pub trait Element: AnyBitPattern {
-    /// Its code in the table.
+pub trait SectionNumber: AnyBitPattern {
+    /// The code of this type in the table.
     const TYPE: ElementType;
-    /// Appends its bytes.
+    /// Appends the number's little-endian bytes.
     fn write_to(self, bytes: &mut Vec<u8>);
-    /// From exactly [`ElementType::size`] bytes; from fewer or more, as if they were zeros.
+    /// The number of exactly [`ElementType::size`] bytes; zero for any other count of bytes.
     fn from_bytes(bytes: &[u8]) -> Self;
 }
 
-macro_rules! element {
+macro_rules! section_number {
     ($number:ty, $type:ident) => {
-        impl Element for $number {
+        impl SectionNumber for $number {
             const TYPE: ElementType = ElementType::$type;
             fn write_to(self, bytes: &mut Vec<u8>) {
                 bytes.extend_from_slice(&self.to_le_bytes());
@@ -73,10 +73,27 @@ macro_rules! element {
         }
     };
 }
-element!(i8, I8);
-element!(u16, U16);
-element!(u32, U32);
-element!(u64, U64);
-element!(f16, F16);
-element!(f32, F32);
-element!(f64, F64);
+section_number!(i8, I8);
+section_number!(u16, U16);
+section_number!(u32, U32);
+section_number!(u64, U64);
+section_number!(f16, F16);
+section_number!(f32, F32);
+section_number!(f64, F64);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Old files hold these codes, so they may never change.
+    #[test]
+    fn codes_of_types_are_frozen() {
+        let codes = ElementType::ALL.map(|kind| (format!("{kind:?}"), kind as u32));
+        let expected = [
+            "Bytes", "Text", "U16", "U32", "U64", "F32", "F64", "I8", "F16",
+        ];
+        for (code, (expected, found)) in expected.into_iter().zip(codes).enumerate() {
+            assert_eq!(found, (expected.to_owned(), code as u32));
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! What can go wrong, and how much a reader may allocate.
+//! What can go wrong.
 
 use std::io;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ pub enum ContainerError {
         /// Why.
         source: io::Error,
     },
-    /// Another kind of file.
+    /// The file is of another kind.
     #[error(
         "not a file of this kind: starts with \"{}\", expected \"{}\"",
         found.escape_ascii(),
@@ -23,19 +23,19 @@ pub enum ContainerError {
     NotThisFormat {
         /// Magic and kind.
         expected: [u8; 12],
-        /// The first bytes, fewer if there are no more.
+        /// The first 12 bytes of the file, or all of a shorter file.
         found: Vec<u8>,
     },
-    /// Written by a newer version of this program, or one too old to read.
+    /// A newer version of this program wrote the file, or one too old to read.
     #[error("{what} version {found} is not supported; supported are {oldest} to {newest}")]
     UnsupportedVersion {
         /// "layout" or "content".
         what: &'static str,
-        /// That of the file.
+        /// Version of the file.
         found: u32,
-        /// Oldest that can be read.
+        /// Oldest version that can be read.
         oldest: u32,
-        /// Newest that can be read.
+        /// Newest version that can be read.
         newest: u32,
     },
     /// The bytes break a rule of the format: whoever wrote the file is at fault.
@@ -43,14 +43,14 @@ pub enum ContainerError {
     Malformed {
         /// The field at fault.
         what: &'static str,
-        /// Where in the file.
+        /// Its position in the file, in bytes.
         at: u64,
         /// The rule.
         expected: String,
-        /// What is there.
+        /// What the file holds.
         found: String,
     },
-    /// More than the caller allows, or than the format does.
+    /// The caller's budget or a limit of the format is exceeded.
     #[error("{what} needs {found}, more than the {limit} allowed")]
     LimitExceeded {
         /// What was asked for.
@@ -60,64 +60,43 @@ pub enum ContainerError {
         /// How much it takes.
         found: u64,
     },
-    /// Damaged after it was written.
+    /// The file was damaged after it was written.
     #[error("{section} is damaged: checksum {found:08x}, expected {expected:08x}")]
     Corrupt {
         /// A section's name, or "header".
         section: String,
-        /// The checksum in the file.
+        /// The checksum that the file states.
         expected: u32,
-        /// That of the bytes.
+        /// The checksum of its bytes.
         found: u32,
     },
-    /// The file has no such section.
+    /// The file has no section of this name.
     #[error("no section \"{name}\"")]
     MissingSection {
-        /// Its name.
+        /// The name asked for.
         name: String,
     },
     /// A section given to the writer breaks a rule: a bug in the caller.
     #[error("section \"{name}\": {reason}")]
     InvalidSection {
-        /// Its name.
+        /// The section's name.
         name: String,
         /// Which rule.
         reason: &'static str,
     },
 }
 
-/// Bytes that a reader may still allocate.
-#[derive(Clone, Debug)]
-pub struct ByteBudget {
-    remaining: u64,
-}
-
-impl ByteBudget {
-    /// A budget of that many bytes.
-    pub fn new(bytes: u64) -> Self {
-        Self { remaining: bytes }
-    }
-
-    /// What is left.
-    pub fn remaining(&self) -> u64 {
-        self.remaining
-    }
-
-    /// Takes `bytes` for `what`; call it before allocating.
-    ///
-    /// # Errors
-    /// [`ContainerError::LimitExceeded`] if fewer are left; nothing is taken then.
-    pub fn spend(&mut self, what: &'static str, bytes: u64) -> Result<(), ContainerError> {
-        match self.remaining.checked_sub(bytes) {
-            Some(remaining) => {
-                self.remaining = remaining;
-                Ok(())
-            }
-            None => Err(ContainerError::LimitExceeded {
-                what,
-                limit: self.remaining,
-                found: bytes,
-            }),
-        }
+/// [`ContainerError::Malformed`], for the field `what` at byte `at` of the file.
+pub(crate) fn malformed(
+    what: &'static str,
+    at: usize,
+    expected: impl ToString,
+    found: impl ToString,
+) -> ContainerError {
+    ContainerError::Malformed {
+        what,
+        at: at as u64,
+        expected: expected.to_string(),
+        found: found.to_string(),
     }
 }

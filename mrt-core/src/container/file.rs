@@ -1,6 +1,7 @@
-//! Whole files in and out.
+//! Reads and writes whole files.
 
-use super::{ByteBudget, ContainerError};
+use super::budget::ByteBudget;
+use super::error::ContainerError;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -9,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Reads a whole file, whose length is first taken from `budget`.
 ///
 /// # Errors
-/// [`ContainerError::Io`] and [`ContainerError::LimitExceeded`].
+/// [`ContainerError::Io`], and [`ContainerError::LimitExceeded`] if `budget` has fewer bytes left.
 pub fn read_file(path: &Path, budget: &mut ByteBudget) -> Result<Vec<u8>, ContainerError> {
     let io_error = |source| ContainerError::Io {
         path: path.to_owned(),
@@ -19,18 +20,20 @@ pub fn read_file(path: &Path, budget: &mut ByteBudget) -> Result<Vec<u8>, Contai
     let length = file.metadata().map_err(io_error)?.len();
     budget.spend("file", length)?;
     let mut bytes = Vec::new();
-    // A file that grows meanwhile is cut at the length that was paid for.
+    // If the file grows meanwhile, no more is read than the budget was charged for.
     file.take(length)
         .read_to_end(&mut bytes)
         .map_err(io_error)?;
     Ok(bytes)
 }
 
-/// Writes a file so that `path` holds either what it held before or all of `bytes`, never a part: to a
-/// temporary file in the same folder, synchronised, then renamed.
+/// Writes a file so that `path` holds either what it held before or all of `bytes`, never a part.
+///
+/// The bytes go to a temporary file in the same folder, which is synchronised to the disk and then
+/// renamed.
 ///
 /// # Errors
-/// [`ContainerError::Io`]; the temporary file is removed then.
+/// [`ContainerError::Io`]. The temporary file is then removed.
 pub fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ContainerError> {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let io_error = |path: &Path| {
@@ -51,7 +54,7 @@ pub fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ContainerE
     let temporary = folder.join(temporary_name);
 
     let write = || -> Result<(), ContainerError> {
-        // Truncates what a crashed process of the same number may have left.
+        // A crashed process of the same number may have left a file: truncate it.
         let mut file = OpenOptions::new()
             .write(true)
             .create(true)
@@ -64,11 +67,11 @@ pub fn write_file_atomically(path: &Path, bytes: &[u8]) -> Result<(), ContainerE
         fs::rename(&temporary, path).map_err(io_error(path))
     };
     if let Err(error) = write() {
-        // The first error tells more than a second one about cleaning up.
+        // An error of removing is ignored: the first error says more.
         let _ = fs::remove_file(&temporary);
         return Err(error);
     }
-    // The rename itself reaches the disk with its folder. Only Unix can open one.
+    // The rename reaches the disk when its folder is synchronised. Only Unix can open a folder.
     #[cfg(unix)]
     File::open(folder)
         .and_then(|folder| folder.sync_all())

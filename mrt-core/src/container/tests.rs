@@ -1,14 +1,10 @@
-//! Tests of the container as a whole: round trips, every named error, and bytes from anywhere.
+//! Tests of the container as a whole: round trips, every named error, and hostile bytes.
 
+use super::fixtures::FORMAT;
+use super::layout::*;
 use super::*;
 use proptest::prelude::*;
 
-const FORMAT: Format = Format {
-    magic: *b"TESTDATA",
-    kind: *b"unit",
-    version: 3,
-    oldest_version: 2,
-};
 const FIRST_ENTRY: usize = HEADER_SIZE;
 const FIRST_CONTENT: usize = 256;
 
@@ -29,7 +25,7 @@ fn open(bytes: &[u8]) -> Result<Container<'_>, ContainerError> {
     Container::read(bytes, &FORMAT, &mut ByteBudget::new(1 << 20))
 }
 
-/// Makes the header's checksum right again, so that a test gets past it.
+/// Makes the header's checksum right again, so that the next check is reached.
 fn reseal(bytes: &mut [u8]) {
     let count = get_u32(bytes, COUNT) as usize;
     let table_end = (HEADER_SIZE + ENTRY_SIZE * count.min(4096)).min(bytes.len());
@@ -39,7 +35,7 @@ fn reseal(bytes: &mut [u8]) {
     }
 }
 
-/// The error after a change to the sample, resealed.
+/// The error of the sample after a change, with a checksum that is right again.
 fn error_after(change: impl FnOnce(&mut Vec<u8>)) -> ContainerError {
     let mut bytes = sample();
     change(&mut bytes);
@@ -47,6 +43,7 @@ fn error_after(change: impl FnOnce(&mut Vec<u8>)) -> ContainerError {
     open(&bytes).expect_err("the change must be refused")
 }
 
+/// The field that a `Malformed` error names.
 fn malformed_field(error: &ContainerError) -> &'static str {
     match error {
         ContainerError::Malformed { what, .. } => what,
@@ -135,7 +132,7 @@ fn every_truncation_and_extension_is_refused() {
         let error = error_after(|bytes| bytes.push(extra));
         assert_eq!(malformed_field(&error), "file length");
     }
-    // Also when the length in the header agrees.
+    // A longer file is refused even if the length in the header agrees.
     let error = error_after(|bytes| {
         bytes.push(0);
         let length = bytes.len() as u64;
@@ -145,7 +142,7 @@ fn every_truncation_and_extension_is_refused() {
 }
 
 #[test]
-fn foreign_files_are_named() {
+fn files_of_another_kind_are_named() {
     for bytes in [&b""[..], b"TEST", b"\x89PNG\r\n\x1a\n and more"] {
         let error = open(bytes).unwrap_err();
         assert!(
@@ -191,18 +188,27 @@ fn broken_tables_are_named() {
         field(&|b| b.copy_within(FIRST_ENTRY..FIRST_ENTRY + 8, second)),
         "section name"
     );
-    assert_eq!(field(&|b| put_u32(b, FIRST_ENTRY + 24, 9)), "element type");
-    // Overlapping, out of order, leaving a gap, beyond the end, wrapping round.
+    assert_eq!(
+        field(&|b| put_u32(b, FIRST_ENTRY + ENTRY_TYPE, 9)),
+        "element type"
+    );
+    // Offsets that overlap, are out of order, leave a gap, lie beyond the end, or wrap around.
     for offset in [FIRST_CONTENT as u64, 0, 320 + 64, 1 << 20, u64::MAX] {
-        assert_eq!(field(&|b| put_u64(b, second + 8, offset)), "section offset");
+        assert_eq!(
+            field(&|b| put_u64(b, second + ENTRY_OFFSET, offset)),
+            "section offset"
+        );
     }
     for length in [1 << 20, u64::MAX, u64::MAX - 255] {
         assert_eq!(
-            field(&|b| put_u64(b, second + 16, length)),
+            field(&|b| put_u64(b, second + ENTRY_LENGTH, length)),
             "section length"
         );
     }
-    assert_eq!(field(&|b| put_u64(b, second + 16, 15)), "section length");
+    assert_eq!(
+        field(&|b| put_u64(b, second + ENTRY_LENGTH, 15)),
+        "section length"
+    );
     assert_eq!(field(&|b| b[FIRST_CONTENT + 63] = 1), "padding");
     assert_eq!(field(&|b| put_u32(b, COUNT, 4096)), "file length");
     assert_eq!(field(&|b| put_u32(b, COUNT, 5)), "padding");
@@ -214,7 +220,7 @@ fn broken_tables_are_named() {
 }
 
 #[test]
-fn damage_names_its_section() {
+fn errors_of_damage_name_the_section() {
     let error = error_after(|bytes| bytes[FIRST_CONTENT] ^= 1);
     assert!(
         error
@@ -260,7 +266,7 @@ fn budgets_are_kept() {
 }
 
 #[test]
-fn wrong_questions_are_answered() {
+fn wrong_names_and_types_are_refused() {
     let mut writer = Writer::new(FORMAT);
     writer.add_numbers("x", &[1.0f32, f32::NAN]).unwrap();
     for name in ["", "nine char", "a b", "ü", "x"] {
@@ -294,7 +300,7 @@ fn text_must_be_text() {
     let mut bytes = sample();
     bytes[FIRST_CONTENT + 5] = 0xff;
     let crc = crc32fast::hash(&bytes[FIRST_CONTENT..FIRST_CONTENT + 8]);
-    put_u32(&mut bytes, FIRST_ENTRY + 28, crc);
+    put_u32(&mut bytes, FIRST_ENTRY + ENTRY_CRC, crc);
     reseal(&mut bytes);
     let error = open(&bytes).unwrap().text("about").unwrap_err();
     let at_the_byte = matches!(error, ContainerError::Malformed { at: 261, .. });
@@ -302,8 +308,8 @@ fn text_must_be_text() {
 }
 
 proptest! {
-    /// Splices, noise and truncation, with and without a checksum that agrees: no panic, and what
-    /// is read fits the budget.
+    /// Splices, noise and truncation, with and without a matching checksum: nothing panics, and
+    /// everything that is read fits the budget.
     #[test]
     fn mutated_bytes_never_panic(
         edits in prop::collection::vec((any::<usize>(), any::<u8>()), 0..6),
@@ -351,6 +357,7 @@ proptest! {
     }
 }
 
+/// Reads every section in every way; what is allocated must fit the allowance.
 fn read_everything(bytes: &[u8], allowance: u64) {
     let mut budget = ByteBudget::new(allowance);
     let Ok(container) = Container::read(bytes, &FORMAT, &mut budget) else {

@@ -1,16 +1,29 @@
 //! From sections to the bytes of a file.
 
-use super::*;
+use super::element::{ElementType, SectionNumber};
+use super::error::ContainerError;
+use super::layout::{
+    ALIGNMENT, CONTENT, COUNT, ENTRY_CRC, ENTRY_LENGTH, ENTRY_NAME, ENTRY_OFFSET, ENTRY_SIZE,
+    ENTRY_TYPE, FILE_LENGTH, Format, HEADER_SIZE, KIND, LAYOUT, LAYOUT_VERSION, MAGIC,
+    MAX_SECTIONS, TABLE_CRC, decode_name, encode_name, put_u32, put_u64, table_crc,
+};
 
 /// Collects sections and lays them out; the same sections give the same bytes.
 #[derive(Clone, Debug)]
 pub struct Writer {
     format: Format,
-    sections: Vec<(String, ElementType, Vec<u8>)>,
+    sections: Vec<NewSection>,
+}
+
+#[derive(Clone, Debug)]
+struct NewSection {
+    name: String,
+    element_type: ElementType,
+    content: Vec<u8>,
 }
 
 impl Writer {
-    /// A container with no section yet.
+    /// A container without sections.
     pub fn new(format: Format) -> Self {
         Self {
             format,
@@ -22,7 +35,7 @@ impl Writer {
     ///
     /// # Errors
     /// As [`Writer::add_bytes`].
-    pub fn add_numbers<T: Element>(
+    pub fn add_numbers<T: SectionNumber>(
         &mut self,
         name: &str,
         numbers: &[T],
@@ -46,7 +59,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`ContainerError::InvalidSection`] if the name is not 1 to 8 printing ASCII characters without
-    /// space, or was used before; [`ContainerError::LimitExceeded`] beyond [`MAX_SECTIONS`].
+    /// space, or is taken; [`ContainerError::LimitExceeded`] beyond [`MAX_SECTIONS`] sections.
     pub fn add_bytes(&mut self, name: &str, bytes: &[u8]) -> Result<(), ContainerError> {
         self.add(name, ElementType::Bytes, bytes.to_vec())
     }
@@ -55,7 +68,7 @@ impl Writer {
         &mut self,
         name: &str,
         element_type: ElementType,
-        bytes: Vec<u8>,
+        content: Vec<u8>,
     ) -> Result<(), ContainerError> {
         let invalid = |reason| ContainerError::InvalidSection {
             name: name.to_owned(),
@@ -64,7 +77,7 @@ impl Writer {
         if name.len() > 8 || decode_name(&encode_name(name)) != Some(name) {
             return Err(invalid("a name is 1 to 8 printing ASCII characters"));
         }
-        if self.sections.iter().any(|(other, ..)| other == name) {
+        if self.sections.iter().any(|section| section.name == name) {
             return Err(invalid("the name is taken"));
         }
         if self.sections.len() >= MAX_SECTIONS as usize {
@@ -74,11 +87,15 @@ impl Writer {
                 found: u64::from(MAX_SECTIONS) + 1,
             });
         }
-        self.sections.push((name.to_owned(), element_type, bytes));
+        self.sections.push(NewSection {
+            name: name.to_owned(),
+            element_type,
+            content,
+        });
         Ok(())
     }
 
-    /// The whole file.
+    /// The bytes of the whole file.
     pub fn finish(&self) -> Vec<u8> {
         let table_end = HEADER_SIZE + ENTRY_SIZE * self.sections.len();
         let mut bytes = vec![0; table_end];
@@ -87,15 +104,15 @@ impl Writer {
         put_u32(&mut bytes, LAYOUT, LAYOUT_VERSION);
         put_u32(&mut bytes, CONTENT, self.format.version);
         put_u32(&mut bytes, COUNT, self.sections.len() as u32);
-        for (k, (name, element_type, content)) in self.sections.iter().enumerate() {
+        for (k, section) in self.sections.iter().enumerate() {
             bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
-            let entry = HEADER_SIZE + ENTRY_SIZE * k;
-            let offset = bytes.len() as u64;
-            bytes[entry..entry + 8].copy_from_slice(&encode_name(name));
-            put_u64(&mut bytes, entry + 8, offset);
-            put_u64(&mut bytes, entry + 16, content.len() as u64);
-            put_u32(&mut bytes, entry + 24, *element_type as u32);
-            put_u32(&mut bytes, entry + 28, crc32fast::hash(content));
+            let (offset, content) = (bytes.len() as u64, &section.content);
+            let entry = &mut bytes[HEADER_SIZE + ENTRY_SIZE * k..][..ENTRY_SIZE];
+            entry[ENTRY_NAME].copy_from_slice(&encode_name(&section.name));
+            put_u64(entry, ENTRY_OFFSET, offset);
+            put_u64(entry, ENTRY_LENGTH, content.len() as u64);
+            put_u32(entry, ENTRY_TYPE, section.element_type as u32);
+            put_u32(entry, ENTRY_CRC, crc32fast::hash(content));
             bytes.extend_from_slice(content);
         }
         let length = bytes.len() as u64;

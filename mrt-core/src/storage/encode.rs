@@ -1,78 +1,85 @@
-//! Choice of scales, and rounding.
+//! Encoding a matrix: the choice of scales, and rounding.
 
-use super::{CowValues, ModeAxis, Storage, StoredMatrix, f16};
+use super::matrix::{CowValues, ModeAxis, Storage, StoredMatrix, assert_finite};
 use crate::linalg::matrix::Matrix;
+use half::f16;
 use std::borrow::Cow;
 
-/// The largest `f16` value of a mode is in 2^14 ..= 2^15: as far as possible above the subnormal numbers,
-/// yet a binade below the largest, so that rounding up cannot reach infinity.
+/// The largest `f16` value of a mode is in 2^14 ..= 2^15: as far as possible above the subnormal
+/// numbers, yet a binade below the largest number, so that rounding up cannot reach infinity.
 const F16_TOP_EXPONENT: i32 = 14;
-/// Largest scale for `f16`: times the largest finite half-precision number it is still finite.
+/// Largest scale for `f16`: its product with the largest half-precision number is still finite.
 const F16_LARGEST_SCALE_EXPONENT: i32 = 112;
 
-/// See [`StoredMatrix::encode`].
-pub(super) fn encode(
-    matrix: &Matrix<f32>,
-    storage: Storage,
-    modes: ModeAxis,
-) -> StoredMatrix<'static> {
-    assert!(
-        matrix.data().iter().all(|x| x.is_finite()),
-        "a matrix to store must be finite"
-    );
-    let scales: Vec<f32> = match storage {
-        Storage::F32 => Vec::new(),
-        Storage::F16 => mode_maxima(matrix, modes).map(f16_scale).collect(),
-        Storage::Int8 => mode_maxima(matrix, modes).map(int8_scale).collect(),
-    };
-    let values = match storage {
-        Storage::F32 => CowValues::F32(Cow::Owned(matrix.data().to_vec())),
-        Storage::F16 => {
-            let values = scaled(matrix, modes, &scales).map(round_to_f16);
-            CowValues::F16(Cow::Owned(values.collect()))
+impl StoredMatrix<'static> {
+    /// Rounds a matrix to `storage`, with a scale a mode unless that is `f32`.
+    ///
+    /// `f16` divides by a power of two, exactly, and rounds to nearest, ties to even, so the error
+    /// does not depend on the magnitude of a mode. `int8` rounds to multiples of 1/127 of the mode's
+    /// largest magnitude, likewise. The same matrix gives the same bits on every machine.
+    ///
+    /// Cost: two passes over the matrix.
+    ///
+    /// # Panics
+    /// If an element is infinite or NaN.
+    pub fn encode(matrix: &Matrix<f32>, storage: Storage, modes: ModeAxis) -> Self {
+        assert_finite(matrix);
+        let scales: Vec<f32> = match storage {
+            Storage::F32 => Vec::new(),
+            Storage::F16 => mode_maxima(matrix, modes).map(f16_scale).collect(),
+            Storage::Int8 => mode_maxima(matrix, modes).map(int8_scale).collect(),
+        };
+        let values = match storage {
+            Storage::F32 => CowValues::F32(Cow::Owned(matrix.data().to_vec())),
+            Storage::F16 => {
+                let values = scaled(matrix, modes, &scales).map(round_to_f16);
+                CowValues::F16(Cow::Owned(values.collect()))
+            }
+            Storage::Int8 => {
+                let values = scaled(matrix, modes, &scales).map(round_to_int8);
+                CowValues::Int8(Cow::Owned(values.collect()))
+            }
+        };
+        StoredMatrix {
+            rows: matrix.rows(),
+            columns: matrix.columns(),
+            modes,
+            values,
+            scales: Cow::Owned(scales),
         }
-        Storage::Int8 => {
-            let values = scaled(matrix, modes, &scales).map(round_to_int8);
-            CowValues::Int8(Cow::Owned(values.collect()))
-        }
-    };
-    StoredMatrix {
-        rows: matrix.rows(),
-        columns: matrix.columns(),
-        modes,
-        values,
-        scales: Cow::Owned(scales),
     }
 }
 
-/// The power of two by which a mode of that largest magnitude is divided; 1 for a mode of zeros.
+/// The power of two that a mode with the given largest magnitude is divided by; 1 for a mode of zeros.
 ///
-/// Powers of two are exact factors, so a product may multiply by them before or after it sums. The limits at
-/// both ends lose nothing: below, the numbers of such a mode are multiples of 2^-149 and stay exact or
-/// normal; above, the largest value lies one binade higher.
+/// Powers of two are exact factors, so a product may multiply by them before or after it sums. The
+/// limits at both ends lose nothing: at the lower one, the numbers of a mode are multiples of 2^-149
+/// and stay exact or normal; at the upper one, the largest value lies one binade higher.
 fn f16_scale(largest: f32) -> f32 {
     if largest == 0.0 {
         return 1.0;
     }
-    // Of a subnormal number this is -127, which the lower limit covers.
+    // A subnormal number gives -127, which the lower limit covers.
     let exponent = (largest.to_bits() >> 23) as i32 - 127;
     let smallest = f32::MIN_EXP - 1;
     let scale = (exponent - F16_TOP_EXPONENT).clamp(smallest, F16_LARGEST_SCALE_EXPONENT);
     f32::from_bits(((scale + 127) as u32) << 23)
 }
 
-/// Nearest half-precision number, ties to even. Beyond the largest finite one, where only numbers next to
-/// `f32::MAX` come, it is that one, an error of at most 2^-11.
+/// Nearest half-precision number, ties to even.
+///
+/// A number beyond the largest finite one becomes that one, an error of at most 2^-11. Only numbers
+/// next to `f32::MAX` get there.
 fn round_to_f16(x: f32) -> f16 {
     let largest = Storage::F16.largest_value();
-    // Not `from_f32`, whose path depends on features that other crates may set.
+    // Not `from_f32`, whose code depends on features that other crates may set.
     f16::from_f32_const(x.clamp(-largest, largest))
 }
 
 /// A 127th of the largest magnitude of a mode; 1 for a mode of zeros.
 ///
-/// Never subnormal, because some machines take such numbers for zero: modes below 127 x 2^-126, about
-/// 1.5e-36, are stored more coarsely.
+/// The scale is never subnormal, because some machines take subnormal numbers for zero. So modes below
+/// 127 x 2^-126, about 1.5e-36, are stored more coarsely.
 fn int8_scale(largest: f32) -> f32 {
     let steps = Storage::Int8.largest_value();
     if largest == 0.0 {
@@ -87,7 +94,7 @@ fn int8_scale(largest: f32) -> f32 {
     }
 }
 
-/// Nearest integer, ties to even; `x` exceeds 127 by rounding errors only.
+/// Nearest integer, ties to even. The clamp is for rounding errors: nothing else exceeds 127.
 fn round_to_int8(x: f32) -> i8 {
     let largest = Storage::Int8.largest_value();
     x.round_ties_even().clamp(-largest, largest) as i8
@@ -110,7 +117,7 @@ fn mode_maxima(matrix: &Matrix<f32>, modes: ModeAxis) -> impl Iterator<Item = f3
     maxima.into_iter()
 }
 
-/// All elements, column by column, divided by the scales of their modes.
+/// Every element divided by the scale of its mode, column by column.
 fn scaled(matrix: &Matrix<f32>, modes: ModeAxis, scales: &[f32]) -> impl Iterator<Item = f32> {
     (0..matrix.columns()).flat_map(move |j| {
         let column = matrix.column(j).iter().enumerate();
@@ -125,7 +132,7 @@ fn scaled(matrix: &Matrix<f32>, modes: ModeAxis, scales: &[f32]) -> impl Iterato
 mod tests {
     use super::*;
 
-    /// Between neighbours of one sign, the midpoint goes to the even one and all else to the nearer.
+    /// The midpoint of two neighbours goes to the even one, every other number to the nearer one.
     #[test]
     fn f16_rounds_to_nearest_even_everywhere() {
         for bits in 0..f16::MAX.to_bits() {
@@ -170,9 +177,9 @@ mod tests {
                 assert!(half.is_normal() && half.to_bits() << 9 == 0, "{x:e}");
                 assert!((half * f16::MAX.to_f32_const()).is_finite(), "{x:e}");
                 assert!(int8.is_normal() && (int8 * 127.0).is_finite(), "{x:e}");
-                // One binade above the usual is for numbers from 2^127 on.
+                // From 2^127 on, values lie one binade higher.
                 assert!(x / half <= if x < 2f32.powi(127) { 32768.0 } else { 65536.0 });
-                // Two units in the last place: one of the scale, one of this quotient.
+                // Two units in the last place: one for the scale, one for this quotient.
                 assert!(x / int8 <= 127.000_02, "{x:e}");
             }
             largest *= 2.0;

@@ -1,34 +1,34 @@
 //! Stored matrices as sections of a container.
 //!
-//! The values are a section whose element type (F32, F16 or I8) tells how they are stored. The scales,
-//! if there are any, are an F32 section of their own, one number a mode. The caller names both: names have
-//! eight bytes, so no suffix would always fit, and the writer refuses a name that is taken. A format that
-//! starts to use F16 or I8 needs a new content version: older readers know neither.
+//! The values are one section, whose element type (F32, F16 or I8) tells how they are stored. The
+//! scales, if there are any, are an F32 section of their own, one number a mode. The caller names both
+//! sections: names have eight bytes, so no suffix would always fit. A format that starts to use F16 or
+//! I8 needs a new content version, because older readers know neither.
 
-use super::{CowValues, ModeAxis, Storage, StoredMatrix, Values};
-use crate::container::{ByteBudget, Container, ContainerError, ElementType, Writer};
+use super::matrix::{CowValues, ModeAxis, Storage, StoredMatrix, StoredValues};
+use crate::container::{ByteBudget, Container, ContainerError, ElementType, Writer, malformed};
 use std::borrow::Cow;
 
-/// Where a matrix is in a container, and what shape its reader expects.
+/// Where a matrix is in a container, and the shape that its reader expects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoredSection<'n> {
     /// Name of the section of values.
     pub values: &'n str,
-    /// Name of the section of scales, which is not looked for where values are `f32`.
+    /// Name of the section of scales; ignored where the values are `f32`.
     pub scales: &'n str,
     /// Rows of the matrix.
     pub rows: usize,
     /// Columns of the matrix.
     pub columns: usize,
-    /// Which lines share a scale.
+    /// Whether rows or columns share a scale.
     pub modes: ModeAxis,
 }
 
-/// Appends a matrix to a container: its values as section `values` and then, unless it is `f32`, its scales
+/// Appends a matrix to a container: its values as section `values` and, unless it is `f32`, its scales
 /// as section `scales`.
 ///
 /// # Errors
-/// As [`Writer::add_bytes`], for either name.
+/// Those of [`Writer::add_bytes`], for either name.
 pub fn write_stored(
     writer: &mut Writer,
     values: &str,
@@ -36,25 +36,26 @@ pub fn write_stored(
     matrix: &StoredMatrix,
 ) -> Result<(), ContainerError> {
     match matrix.values() {
-        Values::F32(numbers) => return writer.add_numbers(values, numbers),
-        Values::F16(numbers) => writer.add_numbers(values, numbers)?,
-        Values::Int8(numbers) => writer.add_numbers(values, numbers)?,
+        StoredValues::F32(numbers) => return writer.add_numbers(values, numbers),
+        StoredValues::F16(numbers) => writer.add_numbers(values, numbers)?,
+        StoredValues::Int8(numbers) => writer.add_numbers(values, numbers)?,
     }
     writer.add_numbers(scales, matrix.scales())
 }
 
-/// Reads a matrix, in place where the bytes of the file allow ([`Container::numbers_in_place`]); what must
-/// be copied is first taken from `budget`.
+/// Reads a matrix, in place where the bytes of the file allow it ([`Container::numbers_in_place`]).
+/// Bytes that must be copied are first taken from `budget`.
 ///
 /// Every element of the result decodes to a finite number. Cost: one pass over the values.
 ///
 /// # Errors
 /// - [`ContainerError::MissingSection`].
-/// - [`ContainerError::LimitExceeded`], if `budget` has fewer bytes left than are to be copied.
-/// - [`ContainerError::Malformed`], if the values have another type than F32, F16 or I8, are not rows x
-///   columns in number, or one is infinite, not a number, or the integer -128; or if the scales are not one a
-///   mode, each a normal positive number (for F16 a power of two) whose product with the largest
-///   value of the type is finite.
+/// - [`ContainerError::LimitExceeded`], if `budget` has fewer bytes left than must be copied.
+/// - [`ContainerError::Malformed`] for values that have another type than F32, F16 or I8, or are not
+///   rows x columns in number, and for a value that is infinite, NaN or the integer -128.
+/// - [`ContainerError::Malformed`] for scales that are not one a mode, and for a scale that is not a
+///   normal positive number (for F16 a power of two) whose product with the largest value of the type
+///   is finite.
 pub fn read_stored<'a>(
     container: &Container<'a>,
     section: &StoredSection,
@@ -62,11 +63,12 @@ pub fn read_stored<'a>(
 ) -> Result<StoredMatrix<'a>, ContainerError> {
     let (rows, columns, name) = (section.rows, section.columns, section.values);
     let element_type = container.element_type(name)?;
-    let storage = Storage::from_element_type(element_type).ok_or_else(|| {
+    let Some(storage) = Storage::from_element_type(element_type) else {
         let (what, expected) = ("element type of a matrix", "F32, F16 or I8");
-        container.fault(name, what, 0, expected, format!("{element_type:?}"))
-    })?;
-    // Lengths come first, so that nothing is copied for a matrix that is refused.
+        let (at, found) = (container.offset(name)?, format!("{element_type:?}"));
+        return Err(malformed(what, at, expected, found));
+    };
+    // Lengths are checked first, so that nothing is copied for a matrix that is refused.
     let count = rows as u128 * columns as u128;
     check_count(container, name, element_type, count)?;
     let values = match storage {
@@ -97,9 +99,11 @@ fn check_count(
     if found as u128 == expected {
         return Ok(());
     }
-    Err(container.fault(name, "count of numbers", 0, expected, found))
+    let at = container.offset(name)?;
+    Err(malformed("count of numbers", at, expected, found))
 }
 
+/// A section of integers from -127 to 127.
 fn symmetric_integers<'a>(
     container: &Container<'a>,
     name: &str,
@@ -108,7 +112,10 @@ fn symmetric_integers<'a>(
     let values = container.numbers_in_place::<i8>(name, budget)?;
     match values.iter().position(|&x| x == i8::MIN) {
         None => Ok(values),
-        Some(at) => Err(container.fault(name, "number", at, "-127 to 127", i8::MIN)),
+        Some(k) => {
+            let at = container.offset(name)? + k;
+            Err(malformed("number", at, "-127 to 127", i8::MIN))
+        }
     }
 }
 
@@ -137,8 +144,8 @@ fn read_scales<'a>(
     match scales.iter().position(|&scale| !legal(scale)) {
         None => Ok(scales),
         Some(k) => {
-            let (what, at) = ("scale of a mode", k * size_of::<f32>());
-            Err(container.fault(name, what, at, rule, scales[k]))
+            let at = container.offset(name)? + k * size_of::<f32>();
+            Err(malformed("scale of a mode", at, rule, scales[k]))
         }
     }
 }

@@ -1,16 +1,18 @@
-//! Tests of what storage does to numbers.
+//! Tests of the errors of stored matrices.
 
 use super::*;
+use crate::container::ElementType;
+use crate::linalg::matrix::{Matrix, multiply};
 use proptest::prelude::*;
 
-/// Stated for `f16`: numbers of random mantissas give 0.02 %.
+/// As stated for `f16`: random mantissas give 0.02 %.
 const F16_TOLERANCE: f64 = 3e-4;
-/// Half a unit in the last place of one number; a constant mode errs as its one number does.
+/// Half a unit in the last place of one number. A mode of equal numbers errs as that number does.
 const F16_MODE_TOLERANCE: f64 = 4.89e-4;
-/// Stated for `int8` where a mode's largest entry is at most twice its root mean square: rounding errs by
-/// 1 / sqrt(12) of a step, a 127th of the largest, which makes 0.23 % times that ratio.
+/// As stated for `int8`, where a mode's largest entry is at most twice its root mean square. Rounding
+/// errs by 1 / sqrt(12) of a step, and a step is a 127th of the largest entry: 0.23 % times the ratio.
 const INT8_TOLERANCE: f64 = 5e-3;
-/// The same for the ratio 4.5: the largest of all 49,152 normal numbers is about 4.2 standard deviations.
+/// The same for a ratio of 4.5: the largest of 49,152 normal numbers is about 4.2 standard deviations.
 const INT8_GAUSSIAN_TOLERANCE: f64 = 1.04e-2;
 
 const TEXELS: usize = 1536;
@@ -39,7 +41,7 @@ fn smooth_columns() -> Matrix<f32> {
     })
 }
 
-/// Root of the sum of squares of the difference, relative to that of `expected`.
+/// L2 norm of the difference over that of `expected`.
 fn relative_l2(found: &[f32], expected: &[f32]) -> f64 {
     let square = |x: f64| x * x;
     let pairs = found.iter().zip(expected);
@@ -117,19 +119,19 @@ fn each_mode_has_its_own_scale() {
     }
 }
 
-/// Errors of elements are independent, so those of a product are relatively as large as the matrix's.
+/// Errors of elements are independent, so the relative error of a product is that of the matrix.
 #[test]
 fn products_err_as_stated() {
     let basis = smooth_columns();
     let coefficients = gaussian_columns().columns_view(0..1).column(0)[..MODES].to_vec();
     let coefficients = Matrix::from_column_major(MODES, 1, coefficients);
-    let exact = crate::linalg::matrix::multiply(basis.view(), coefficients.view());
+    let exact = multiply(basis.view(), coefficients.view());
     for (storage, tolerance) in [
         (Storage::F16, F16_TOLERANCE),
         (Storage::Int8, INT8_TOLERANCE),
     ] {
         let stored = StoredMatrix::encode(&basis, storage, ModeAxis::Columns).to_matrix();
-        let product = crate::linalg::matrix::multiply(stored.view(), coefficients.view());
+        let product = multiply(stored.view(), coefficients.view());
         let error = relative_l2(product.data(), exact.data());
         assert!(error <= tolerance, "{}: {error:e}", storage.name());
     }
@@ -159,22 +161,22 @@ fn bytes_count_values_and_scales() {
     assert_eq!(bytes(Storage::Int8, ModeAxis::Columns), 30 + 12);
 }
 
-/// Frozen, so that a change of rounding or scales does not go unnoticed.
+/// A change of rounding or of scales must not go unnoticed.
 #[test]
 fn bits_are_frozen() {
     let matrix = Matrix::from_column_major(2, 2, vec![1.0, -1.0 / 3.0, 1e-8, 3e-8]);
     let half = StoredMatrix::encode(&matrix, Storage::F16, ModeAxis::Columns);
     let bits = [0x7400, 0xed55, 0x6d5e, 0x7407].map(f16::from_bits);
-    assert_eq!(half.values(), Values::F16(&bits));
+    assert_eq!(half.values(), StoredValues::F16(&bits));
     assert_eq!(half.scales(), [2f32.powi(-14), 2f32.powi(-39)]);
     let int8 = StoredMatrix::encode(&matrix, Storage::Int8, ModeAxis::Columns);
-    assert_eq!(int8.values(), Values::Int8(&[127, -42, 42, 127]));
+    assert_eq!(int8.values(), StoredValues::Int8(&[127, -42, 42, 127]));
     assert_eq!(int8.scales(), [1.0 / 127.0, 3e-8 / 127.0]);
 }
 
 #[test]
 #[should_panic = "must be finite"]
-fn what_is_not_finite_is_not_encoded() {
+fn numbers_that_are_not_finite_are_not_encoded() {
     let matrix = Matrix::from_column_major(1, 2, vec![1.0, f32::INFINITY]);
     StoredMatrix::encode(&matrix, Storage::F16, ModeAxis::Columns);
 }
@@ -191,13 +193,13 @@ fn any_finite_matrix() -> impl Strategy<Value = Matrix<f32>> {
     })
 }
 
-/// Most by which an element may err that is stored with that scale.
+/// Largest error of an element `x` that is stored with the given scale.
 fn element_tolerance(storage: Storage, x: f64, scale: f64) -> f64 {
     match storage {
         Storage::F32 => 0.0,
         // Half a unit in the last place, of a normal number or of the subnormal ones.
         Storage::F16 => (x.abs() * 2f64.powi(-11)).max(scale * 2f64.powi(-25)),
-        // Half a step; the excess covers the roundings of scale, quotient and product.
+        // Half a step, and the roundings of scale, quotient and product.
         Storage::Int8 => scale * 0.500_02,
     }
 }

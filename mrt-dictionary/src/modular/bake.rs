@@ -16,12 +16,13 @@ use crate::modular::paths::transport::Gather;
 use crate::modular::transport::cube::{ShapeTransport, neighbours, shape_transport};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_runtime::level::shape::{Hole, Outline, Shape, shape_set};
-use mrt_runtime::modular::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
-    Sources,
+use mrt_runtime::Dictionary;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::{Hole, Outline, shape_set};
+use mrt_runtime::low_level::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
 };
-use mrt_runtime::modular::path::Word;
+use mrt_runtime::low_level::modular::path::Word;
 
 /// Bakes a set of shapes with settings that pass [`BakeConfig::check`]. The same settings give the same bits
 /// on every machine and thread count.

@@ -23,9 +23,10 @@ use crate::progress::{Cancelled, Progress};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::TubeForm;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathTable, ShapeOperators,
+use mrt_runtime::Dictionary;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, PathTable, ShapeOperators,
 };
 
 /// A tube of the set with its modes.

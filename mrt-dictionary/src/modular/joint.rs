@@ -19,8 +19,8 @@ use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::svd::{largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 
 /// Light of a shape's own modes.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use crate::modular::surface::mirrors::texel_parity_classes;
 use crate::modular::transport::modes::{block_transport, fold_bounce};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::linalg::svd::{energy_rank, svd};
-use mrt_runtime::level::shape::SHAPES;
+use mrt_runtime::blocks::SHAPES;
 
 /// `k_d` of the paper's table.
 const TABLE_PRIOR_VECTORS: usize = 64;

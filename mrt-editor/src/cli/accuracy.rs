@@ -10,14 +10,12 @@ use mrt_core::reference::oracle_file::{
     Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceError, ReferenceFile, read,
 };
 use mrt_dictionary::config::BakeConfig;
-use mrt_runtime::level::block::{CellsError, Level};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::blocks::CellsError;
+use mrt_runtime::shadows::Openings;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, FrameError, Level, Light,
+    Outputs, ProbeOrder, Scene,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -298,7 +296,7 @@ pub fn compare(
         ..AssembleConfig::default()
     };
     let scene =
-        assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
+        Scene::assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
             scene: scene_name(),
             source,
         })?;
@@ -407,14 +405,14 @@ fn our_signal(
     if let Kind::RadianceSh9 { points, .. } = &reference.kind {
         return our_probes(reference, scene, frame, points);
     }
-    let resolution = reference.resolution.unwrap_or(scene.resolution);
+    let resolution = reference.resolution.unwrap_or(scene.level.resolution);
     let channels = match reference.kind {
         Kind::IrradianceRgb { .. } => 3,
         _ => 1,
     };
     let mut ours = Vec::new();
     for (block, face) in reference.walls.iter().copied() {
-        let canonical = scene.blocks[block].orientation.inverse();
+        let canonical = scene.level.blocks[block].orientation.inverse();
         for texel in 0..resolution * resolution {
             let (row, column) = (texel / resolution, texel % resolution);
             let point = canonical.point(face.texel_center(resolution, row, column));

@@ -10,14 +10,12 @@ use crate::render::tone::{auto_exposure, tone_map};
 use crate::render::{Picture, render};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::text::{LevelTextError, from_text};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, StageTimes};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::low_level::level::text::from_text;
+use mrt_runtime::shadows::Openings;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameError, Level, LevelTextError,
+    Light, Scene, StageTimes,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -144,7 +142,7 @@ pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
     let dictionary = load(args.dictionary.as_deref(), None)?;
     let level = read_level(args)?;
     let start = Instant::now();
-    let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let assemble_ms = milliseconds(start.elapsed());
     let lights = maze_lights(&scene);
     let mut frame = Frame::new(&scene);
@@ -190,15 +188,15 @@ fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
 
 /// A warm light in the first block and a cool one in the block farthest from it.
 fn maze_lights(scene: &Scene) -> Vec<Light> {
-    let center = |block: usize| scene.blocks[block].warp.center();
-    let far = (0..scene.blocks.len())
+    let center = |block: usize| scene.level.blocks[block].warp.center();
+    let far = (0..scene.level.blocks.len())
         .max_by(|&a, &b| {
             let distance = |block: usize| center(block).distance(center(0));
             distance(a).total_cmp(&distance(b))
         })
         .unwrap_or(0);
     let sphere = |block: usize, unit: DVec3, intensity: Vec3| {
-        let warp = &scene.blocks[block].warp;
+        let warp = &scene.level.blocks[block].warp;
         let size = block_size(warp);
         Light::Sphere {
             position: warp.point(unit).as_vec3(),
@@ -260,14 +258,14 @@ fn take_pictures(
         });
     let (min, max) = (min.as_vec3(), max.as_vec3());
     let (middle, extent) = (0.5 * (min + max), (max - min).max_element());
-    let size = block_size(&scene.blocks[0].warp);
+    let size = block_size(&scene.level.blocks[0].warp);
     let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
     let from_above = middle + Vec3::new(0.0, 1.0 * extent, 0.6 * extent);
-    let eye = scene.blocks[0]
+    let eye = scene.level.blocks[0]
         .warp
         .point(DVec3::new(0.06, 0.5, 0.5))
         .as_vec3();
-    let ahead = scene.blocks[0]
+    let ahead = scene.level.blocks[0]
         .warp
         .point(DVec3::new(3.0, 0.42, 0.5))
         .as_vec3();
@@ -330,7 +328,7 @@ fn report(
     errors: Option<LevelErrors>,
     pictures: Vec<String>,
 ) -> DemoReport {
-    let used = |shape| scene.blocks.iter().any(|block| block.shape == shape);
+    let used = |shape| scene.level.blocks.iter().any(|block| block.shape == shape);
     DemoReport {
         blocks: level.blocks.len(),
         connections: level.connections.len(),

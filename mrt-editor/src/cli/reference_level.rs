@@ -7,11 +7,8 @@ use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters
 use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene, Side};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::shadows::Openings;
+use mrt_runtime::{Bounces, Frame, FrameError, Level, Light, Scene};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -76,16 +73,16 @@ pub fn measure(
         return Err(ReferenceLevelError::Tube { block, shape });
     }
     let start = Instant::now();
-    let exact = exact_scene(level, scene.resolution)?;
+    let exact = exact_scene(level, scene.level.resolution)?;
     let transport = Transport::build(&exact);
     let first = exact_irradiance(level, &exact, &transport, lights, 1)?;
     let many = exact_irradiance(level, &exact, &transport, lights, bounces as usize)?;
     let direct = exact_direct(&exact, lights)?;
     let exact_seconds = start.elapsed().as_secs_f64();
     frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
-    let our_first = in_level_order(level, scene, &frame.indirect());
+    let our_first = in_level_order(level, scene, &indirect(&frame));
     frame.solve(scene, lights, &Openings, Bounces::Count(bounces))?;
-    let our_many = in_level_order(level, scene, &frame.indirect());
+    let our_many = in_level_order(level, scene, &indirect(&frame));
     let our_direct = in_level_order(level, scene, &frame.direct());
     let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<_>>();
     Ok(LevelErrors {
@@ -185,10 +182,10 @@ fn exact_direct(exact: &ExactScene, lights: &[Light]) -> Result<Vec<f64>, Refere
 fn in_level_order(level: &Level, scene: &Scene, signal: &[f32]) -> Vec<f64> {
     let mut out = Vec::with_capacity(signal.len());
     for (index, block) in level.blocks.iter().enumerate() {
-        let range = &scene.blocks[index].texels;
+        let range = &scene.level.blocks[index].texels;
         for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
-            for row in 0..scene.resolution {
-                for column in 0..scene.resolution {
+            for row in 0..scene.level.resolution {
+                for column in 0..scene.level.resolution {
                     let texel = scene.level_texel(index, face, row, column).unwrap_or(0);
                     for channel in 0..3 {
                         let at = 3 * range.start + channel * range.len() + texel;

@@ -1,8 +1,8 @@
 //! Reading and writing a level's file.
 
 use mrt_core::container::{ContainerError, write_file_atomically};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::text::{LevelTextError, MAX_TEXT_BYTES, from_text, to_text};
+use mrt_runtime::low_level::level::text::{MAX_TEXT_BYTES, from_text, to_text};
+use mrt_runtime::{Level, LevelTextError};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

@@ -5,7 +5,7 @@ use glam::Vec3;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
-use mrt_runtime::output::lightmap_atlas::AtlasLayout;
+use mrt_runtime::low_level::output::lightmap_atlas::LightmapAtlas;
 use std::f32::consts::PI;
 
 /// Shadow rays to each light that are always cast.

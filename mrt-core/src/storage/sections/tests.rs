@@ -1,18 +1,11 @@
-//! Tests of sections: in place and copied, and hostile ones.
+//! Tests of sections: in place, copied, and hostile.
 
 use super::*;
-use crate::container::{Element, Format};
+use crate::container::SectionNumber;
+use crate::container::fixtures::{FORMAT, Placed, open};
 use crate::linalg::matrix::Matrix;
 use crate::storage::f16;
 use proptest::prelude::*;
-
-const FORMAT: Format = Format {
-    magic: *b"TESTDATA",
-    kind: *b"unit",
-    version: 1,
-    oldest_version: 1,
-};
-const ALIGNMENT: usize = crate::container::ALIGNMENT;
 
 fn matrix() -> Matrix<f32> {
     Matrix::from_fn(5, 3, |i, j| (i as f32 - 1.7) * [1.0, 1e-8, -1e9][j])
@@ -36,31 +29,19 @@ fn file_of(stored: &StoredMatrix) -> Vec<u8> {
 }
 
 /// A file of arbitrary values and scales.
-fn file_with<T: Element, S: Element>(values: &[T], scales: &[S]) -> Vec<u8> {
+fn file_with<T: SectionNumber, S: SectionNumber>(values: &[T], scales: &[S]) -> Vec<u8> {
     let mut writer = Writer::new(FORMAT);
     writer.add_numbers("straight", values).unwrap();
     writer.add_numbers("s.scale", scales).unwrap();
     writer.finish()
 }
 
-/// Room that holds the file `shift` bytes after a multiple of 64, and where it starts.
-fn placed(file: &[u8], shift: usize) -> (Vec<u8>, usize) {
-    let mut room = vec![0; file.len() + 2 * ALIGNMENT];
-    let start = room.as_ptr().align_offset(ALIGNMENT) + shift;
-    room[start..start + file.len()].copy_from_slice(file);
-    (room, start)
-}
-
-fn open(bytes: &[u8]) -> Container<'_> {
-    Container::read(bytes, &FORMAT, &mut ByteBudget::new(1 << 16)).unwrap()
-}
-
 fn read<'a>(bytes: &'a [u8], section: &StoredSection) -> Result<StoredMatrix<'a>, ContainerError> {
     read_stored(&open(bytes), section, &mut ByteBudget::new(1 << 16))
 }
 
-/// The message for a 2 x 2 matrix with column scales.
-fn refusal<T: Element, S: Element>(values: &[T], scales: &[S]) -> String {
+/// The message of the error for a 2 x 2 matrix with a scale a column.
+fn refusal<T: SectionNumber, S: SectionNumber>(values: &[T], scales: &[S]) -> String {
     let file = file_with(values, scales);
     let error = read(&file, &section(2, 2, ModeAxis::Columns)).unwrap_err();
     assert!(matches!(error, ContainerError::Malformed { .. }), "{error}");
@@ -69,9 +50,9 @@ fn refusal<T: Element, S: Element>(values: &[T], scales: &[S]) -> String {
 
 fn address_of_values(stored: &StoredMatrix) -> *const u8 {
     match stored.values() {
-        Values::F32(values) => values.as_ptr().cast(),
-        Values::F16(values) => values.as_ptr().cast(),
-        Values::Int8(values) => values.as_ptr().cast(),
+        StoredValues::F32(values) => values.as_ptr().cast(),
+        StoredValues::F16(values) => values.as_ptr().cast(),
+        StoredValues::Int8(values) => values.as_ptr().cast(),
     }
 }
 
@@ -83,8 +64,8 @@ fn aligned_files_are_used_in_place_and_others_copied() {
         assert!(!stored.is_borrowed());
         let file = file_of(&stored);
         for shift in 0..8 {
-            let (room, start) = placed(&file, shift);
-            let bytes = &room[start..start + file.len()];
+            let placed = Placed::new(&file, shift);
+            let bytes = placed.bytes();
             let mut budget = ByteBudget::new(1000);
             let section = section(5, 3, ModeAxis::Columns);
             let found = read_stored(&open(bytes), &section, &mut budget).unwrap();
@@ -117,8 +98,8 @@ fn copies_stay_within_the_budget() {
         Storage::F16,
         ModeAxis::Rows,
     ));
-    let (room, start) = placed(&file, 1);
-    let container = open(&room[start..start + file.len()]);
+    let placed = Placed::new(&file, 1);
+    let container = open(placed.bytes());
     // 30 bytes of values and 20 of scales.
     for (allowance, fits) in [(29, false), (49, false), (50, true)] {
         let mut budget = ByteBudget::new(allowance);
@@ -138,7 +119,7 @@ fn other_shapes_are_refused() {
             let error = read(&file, &section(rows, columns, ModeAxis::Columns)).unwrap_err();
             assert!(error.to_string().contains("count of numbers"), "{error}");
         }
-        // Scales of the other axis are as many as columns, not rows; f32 has none.
+        // There is a scale a column, not a row; `f32` has none.
         let other_axis = read(&file, &section(5, 3, ModeAxis::Rows));
         match storage {
             Storage::F32 => assert!(other_axis.is_ok()),
@@ -214,7 +195,7 @@ fn wrong_scales_are_refused() {
         let message = refusal(&halves, &[scale, 1.0]);
         assert!(message.contains("power of two"), "{message}");
     }
-    // The largest that are accepted decode to finite numbers.
+    // The largest accepted scales decode to finite numbers.
     let section = section(2, 2, ModeAxis::Columns);
     let file = file_with(&[f16::MAX; 4], &[2f32.powi(112); 2]);
     assert!(read(&file, &section).unwrap().get(1, 1).is_finite());
@@ -247,8 +228,8 @@ fn names_that_are_taken_are_refused() {
 }
 
 proptest! {
-    /// Any bytes under any of the types: an error, or a matrix of finite numbers; and one that was
-    /// read gives the same file again.
+    /// Any bytes of any type give an error or a matrix of finite numbers, and that matrix gives the
+    /// same file again.
     #[test]
     fn hostile_sections_never_panic(
         values in prop::collection::vec(any::<u8>(), 16),
@@ -258,7 +239,7 @@ proptest! {
         tame in any::<bool>(),
     ) {
         let number = |bytes: &[u8]| f32::from_bytes(bytes);
-        // Half of the time with scales that pass, to get at what follows.
+        // Half of the time scales pass, so that the checks behind them are reached.
         let scales: Vec<f32> = scales
             .into_iter()
             .map(|bits| f32::from_bits(if tame { bits & 0x3f80_0000 | 0x2000_0000 } else { bits }))

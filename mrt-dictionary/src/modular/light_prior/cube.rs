@@ -9,7 +9,7 @@ use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::svd::svd;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
 
 /// Columns `P S` (basis vectors of direct irradiance times their singular values), in the coordinates
 /// of each parity class of the texels.

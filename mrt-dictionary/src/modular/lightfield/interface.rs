@@ -21,7 +21,7 @@ use mrt_core::geometry::polygon_moments::polygon_moments;
 use mrt_core::linalg::matrix::{Matrix, dot, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Hole;
+use mrt_runtime::low_level::level::shape::Hole;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 

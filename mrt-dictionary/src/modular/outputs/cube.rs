@@ -11,7 +11,7 @@ use mrt_core::geometry::polygon_moments::{Moments, polygon_moments};
 use mrt_core::lighting::hemisphere_sh::ohlsh_from_moments;
 use mrt_core::lighting::sh;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 

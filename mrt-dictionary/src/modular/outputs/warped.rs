@@ -149,7 +149,7 @@ mod tests {
     };
     use mrt_core::geometry::hexahedron::Hexahedron;
     use mrt_core::linalg::matrix::multiply;
-    use mrt_runtime::level::shape::Shape;
+    use mrt_runtime::blocks::Shape;
 
     #[test]
     fn on_the_cube_they_are_the_canonical_outputs() {

@@ -15,8 +15,8 @@ use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 
 /// The emission basis.
 #[derive(Clone, Debug)]

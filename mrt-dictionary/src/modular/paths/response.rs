@@ -11,7 +11,7 @@ use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::modular::path::Word;
+use mrt_runtime::low_level::modular::path::Word;
 use rayon::prelude::*;
 
 /// The response basis and the paths' operators.

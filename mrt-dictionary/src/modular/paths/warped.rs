@@ -28,8 +28,9 @@ use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon}
 use mrt_core::geometry::polygon_moments::polygon_moments;
 use mrt_core::lighting::sh;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::{Aperture, Shape};
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::Aperture;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 use rayon::prelude::*;
 
 /// Rays along each axis of a texel of the canonical emitter.

@@ -5,8 +5,8 @@ use glam::{DVec3, IVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_runtime::level::mirrors::mirrors;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::mirrors::mirrors;
 use std::collections::HashMap;
 
 /// Parity classes of the shape's texels: eight for cube, straight and cross, four for most others.
@@ -65,7 +65,7 @@ fn scaled(point: DVec3, steps: usize) -> IVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mrt_runtime::level::shape::cubes;
+    use mrt_runtime::low_level::level::shape::cubes;
 
     #[test]
     fn fold_factors_are_those_of_the_shapes() {

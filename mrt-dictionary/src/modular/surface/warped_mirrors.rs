@@ -140,7 +140,7 @@ pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
 mod tests {
     use super::*;
     use crate::modular::surface::mirrors::texel_parity_classes;
-    use mrt_runtime::level::shape::{Outline, Shape, cubes};
+    use mrt_runtime::low_level::level::shape::{Outline, Shape, cubes};
 
     fn class_count(corner: impl Fn(DVec3) -> DVec3) -> usize {
         let warp = Hexahedron {

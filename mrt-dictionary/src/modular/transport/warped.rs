@@ -218,7 +218,7 @@ mod tests {
     use mrt_core::geometry::cube::Face;
     use mrt_core::geometry::hexahedron::Hexahedron;
     use mrt_core::linalg::matrix::multiply;
-    use mrt_runtime::level::shape::SHAPES;
+    use mrt_runtime::blocks::SHAPES;
 
     const RESOLUTION: usize = 8;
 

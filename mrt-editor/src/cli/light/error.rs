@@ -5,8 +5,7 @@ use crate::document::level_file::LevelFileError;
 use crate::import::ImportError;
 use crate::render::file::WriteError;
 use glam::Vec3;
-use mrt_runtime::modular::assemble::AssembleError;
-use mrt_runtime::modular::frame::FrameError;
+use mrt_runtime::{AssembleError, FrameError};
 use std::path::PathBuf;
 
 /// Why there are no pictures.
