@@ -18,7 +18,7 @@ use mrt_editor::cli::dictionary_source::{SourceError, load};
 use mrt_editor::cli::table::Table;
 use mrt_editor::render::file::WriteError;
 use mrt_editor::render::level_view::ViewError;
-use mrt_runtime::{AssembleError, Dictionary, FrameError, LevelTextError};
+use mrt_runtime::{AssembleError, Dictionary, LevelTextError, SkippedLight};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -146,7 +146,7 @@ pub enum FigureError {
     Assemble(#[from] AssembleError),
     /// A light is refused.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// Nothing can be seen.
     #[error(transparent)]
     View(#[from] ViewError),

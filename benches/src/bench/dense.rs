@@ -14,6 +14,7 @@ use mrt_core::linalg::svd::symmetric_eigen;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene};
 use mrt_editor::cli::reference_level::exact_scene;
+use mrt_runtime::BlockIndex;
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -71,7 +72,12 @@ impl Dense {
             let range = &ours.scene.level.blocks[wall.block].texels;
             for k in 0..resolution * resolution {
                 let (row, column) = (k / resolution, k % resolution);
-                let at = ours.scene.level_texel(wall.block, wall.face, row, column);
+                let at = ours.scene.level.level_texel(
+                    BlockIndex::new(wall.block),
+                    wall.face,
+                    row,
+                    column,
+                );
                 for channel in 0..3 {
                     let from = 3 * range.start + channel * range.len() + at.unwrap_or(0);
                     radiosity[(wall.first_texel + k, channel)] = ALBEDO[channel] * direct[from];

@@ -392,7 +392,7 @@ impl Bench<'_> {
 
 /// Modes `k_b` of the scene's blocks, the most.
 fn modes(ours: &Ours) -> usize {
-    let blocks = ours.scene.level.blocks.iter();
+    let blocks = ours.scene.blocks.iter();
     blocks.map(|b| b.coefficients.len()).max().unwrap_or(0)
 }
 

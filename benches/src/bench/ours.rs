@@ -6,10 +6,9 @@ use super::timing::Timed;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
 use mrt_runtime::executor::{Executor, Rayon, Serial};
-use mrt_runtime::shadows::Openings;
 use mrt_runtime::{
-    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, FrameConfig, FrameError,
-    Light, Scene,
+    AssembleConfig, AssembleError, BlockIndex, Bounces, Coupling, Dictionary, Frame, FrameConfig,
+    Light, LightId, Scene, SkippedLight,
 };
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::Arc;
@@ -104,7 +103,7 @@ pub enum OursError {
     Assemble(#[from] AssembleError),
     /// The lights are refused.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// The system gives no threads.
     #[error("no threads: {0}")]
     Threads(#[from] ThreadPoolBuildError),
@@ -172,6 +171,7 @@ pub struct Ours {
     pub scene: Scene,
     config: FrameConfig,
     frame: Frame,
+    ids: Vec<LightId>,
     lights: Vec<Light>,
     motion: Motion,
     is_moved: bool,
@@ -205,14 +205,15 @@ impl Ours {
         let config = FrameConfig {
             simd: variant.simd,
             executor,
+            bounces: Bounces::Count(1),
             ..FrameConfig::default()
         };
-        let mut frame = Frame::with_config(&scene, config.clone());
-        frame.solve(&scene, &setting.lights, &Openings, Bounces::Count(1))?;
+        let (frame, ids) = first_frame(&scene, &config, &setting.lights)?;
         Ok(Self {
             scene,
             config,
             frame,
+            ids,
             lights: setting.lights.clone(),
             motion: Motion::Everything,
             is_moved: false,
@@ -230,16 +231,13 @@ impl Ours {
     /// # Errors
     /// [`OursError::Frame`].
     pub fn with_tolerance(mut self, share: f32) -> Result<Self, OursError> {
-        let brightest = self.indirect(&frame).into_iter().fold(0.0, f32::max);
+        let brightest = self.indirect().into_iter().fold(0.0, f32::max);
         let config = FrameConfig {
             tolerance: share * brightest,
             ..self.config.clone()
         };
-        self.frame = Frame::with_config(&self.scene, config.clone());
+        (self.frame, self.ids) = first_frame(&self.scene, &config, &self.lights)?;
         self.config = config;
-        let bounces = Bounces::Count(1);
-        self.frame
-            .solve(&self.scene, &self.lights, &Openings, bounces)?;
         Ok(self)
     }
 
@@ -258,7 +256,7 @@ impl Ours {
 
     /// The largest difference of a texel's indirect irradiance from another frame's of the same level.
     pub fn largest_difference(&self, other: &Self) -> f64 {
-        let (a, b) = (self.indirect(&frame), other.indirect(&frame));
+        let (a, b) = (self.indirect(), other.indirect());
         let apart = a.iter().zip(&b).map(|(a, b)| (a - b).abs());
         f64::from(apart.fold(0.0, f32::max))
     }
@@ -267,24 +265,37 @@ impl Ours {
     fn move_lights(&mut self, count: usize) {
         self.is_moved = !self.is_moved;
         let step = if self.is_moved { STEP } else { -STEP };
-        for light in &mut self.lights[..count] {
+        for (light, &id) in self.lights[..count].iter_mut().zip(&self.ids) {
             if let Light::Sphere { position, .. } = light {
                 position.x += step;
             }
+            self.frame.set_light(id, *light);
         }
     }
 
     /// Direct irradiance of the last frame, block by block in the level's order, in a block channel by channel.
     pub fn direct(&self) -> Vec<f32> {
-        self.frame.direct()
+        let mut copy = Vec::new();
+        self.frame.copy_direct_to(&mut copy);
+        copy
+    }
+
+    /// Indirect irradiance of the last frame, in the same order.
+    fn indirect(&self) -> Vec<f32> {
+        let mut copy = Vec::new();
+        self.frame.copy_indirect_to(&mut copy);
+        copy
     }
 
     /// Indirect irradiance of the last frame.
     pub fn irradiance(&self, receivers: &[Receiver]) -> Vec<[f64; 3]> {
         let at = |receiver: &Receiver| {
             let texel = texel_of(&self.scene, receiver);
-            let indirect = self.frame.indirect_at(&self.scene, receiver.block, texel);
-            indirect.map(f64::from)
+            let indirect = self
+                .frame
+                .indirect_at(BlockIndex::new(receiver.block), texel);
+            let indirect = indirect.expect("receivers are texels of the scene");
+            indirect.to_array().map(f64::from)
         };
         receivers.iter().map(at).collect()
     }
@@ -300,14 +311,14 @@ impl Ours {
         let scene = &self.scene;
         // Positions, normals, albedo and emission; direct and indirect light.
         let slots = scene.layout.slot_count() * (4 * RGB_BYTES + 2 * RGB_BYTES);
-        let lightmap = size_of_val(self.frame.lightmap());
+        let lightmap = size_of_val(self.frame.lightmap().pixels());
         scene.operator_bytes() + slots + self.signal_bytes().iter().sum::<usize>() + lightmap
     }
 
     /// Bytes of b and r of all blocks.
     fn signal_bytes(&self) -> [usize; 2] {
-        let layout = &self.scene.layout;
-        [RGB_BYTES * layout.rows * layout.block_count(); 2]
+        let scene = &self.scene;
+        [RGB_BYTES * scene.rows.count * scene.blocks.len(); 2]
     }
 
     /// What each of [`STAGES`] had to do for the light of the last frame: the products of blocks with light, folded by
@@ -321,14 +332,14 @@ impl Ours {
             lit.map(of_place).sum()
         };
         let slots = |place: usize| (RGB_BYTES * layout.slots[place].len()) as f64;
-        let rows = |_| (RGB_BYTES * layout.rows) as f64;
+        let rows = |_| (RGB_BYTES * scene.rows.count) as f64;
         let products = |stage: usize| {
             move |place: usize| {
                 let shape = &scene.shapes[layout.shapes[place] as usize];
                 2.0 * shape.multiply_adds()[stage] as f64
             }
         };
-        let lightmap = size_of_val(self.frame.lightmap()) as f64;
+        let lightmap = size_of_val(self.frame.lightmap().pixels()) as f64;
         let mut operators = [0.0; 2];
         for shape in &scene.shapes {
             for (sum, bytes) in operators.iter_mut().zip(shape.stage_bytes()) {
@@ -367,18 +378,32 @@ impl Ours {
 
     /// By place: whether there are direct light, coefficients b and indirect light.
     fn lit(&self) -> [Vec<bool>; 3] {
-        let frame = &self.frame;
-        let signals = [frame.direct(), frame.coefficients(), indirect(&frame)];
+        let mut coefficients = Vec::new();
+        self.frame.copy_coefficients_to(&mut coefficients);
+        let signals = [self.direct(), coefficients, self.indirect()];
         let mut lit = [(); 3].map(|()| vec![false; self.scene.level.blocks.len()]);
-        for (block, &place) in self.scene.level.blocks.iter().zip(&self.scene.layout.rank) {
-            let ranges = [&block.texels, &block.coefficients, &block.texels];
+        let blocks = self.scene.blocks.iter().zip(&self.scene.level.blocks);
+        for ((block, placed), &rank) in blocks.zip(&self.scene.layout.rank) {
+            let ranges = [&placed.texels, &block.coefficients, &placed.texels];
             for ((lit, signal), range) in lit.iter_mut().zip(&signals).zip(ranges) {
                 let values = &signal[3 * range.start..3 * range.end];
-                lit[place as usize] = values.iter().any(|&value| value != 0.0);
+                lit[rank.get()] = values.iter().any(|&value| value != 0.0);
             }
         }
         lit
     }
+}
+
+/// A frame that is lit by all lights, and their ids.
+fn first_frame(
+    scene: &Scene,
+    config: &FrameConfig,
+    lights: &[Light],
+) -> Result<(Frame, Vec<LightId>), SkippedLight> {
+    let mut frame = Frame::new(scene, config.clone());
+    let ids = lights.iter().map(|&light| frame.add_light(light)).collect();
+    frame.solve().require_all_lights()?;
+    Ok((frame, ids))
 }
 
 /// Bytes of three numbers.
@@ -394,7 +419,8 @@ pub fn texel_of(scene: &Scene, receiver: &Receiver) -> usize {
         ..
     } = *receiver;
     scene
-        .level_texel(block, face, row, column)
+        .level
+        .level_texel(BlockIndex::new(block), face, row, column)
         .expect("receivers are texels of the level's walls at the scene's resolution")
 }
 
@@ -405,20 +431,22 @@ impl Timed for Ours {
             Motion::OneLight => self.move_lights(1),
             Motion::AllLights => self.move_lights(self.lights.len()),
         }
-        let (frame, scene, lights) = (&mut self.frame, &self.scene, &self.lights);
-        let mut solve = || frame.solve(scene, lights, &Openings, Bounces::Count(1));
-        match &self.pool {
+        let frame = &mut self.frame;
+        let mut solve = || frame.solve();
+        let report = match &self.pool {
             None => solve(),
             Some(Pool(threads)) => threads.install(solve),
-        }
-        .expect("the first frame was accepted");
-        let times = self.frame.times();
+        };
+        report
+            .require_all_lights()
+            .expect("the first frame was lit by all");
+        let times = report.times();
         [
             times.direct,
             times.coefficients,
             times.responses,
             times.indirect,
-            times.atlas,
+            times.lightmap,
         ]
         .map(|time| time.as_secs_f64())
         .to_vec()

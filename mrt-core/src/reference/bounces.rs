@@ -1,11 +1,11 @@
-//! Which reflections a reference holds.
+//! Which reflections a reference contains.
 
 /// How many diffuse reflections an indirect irradiance contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bounces {
-    /// Light that was reflected once.
+    /// Light that was reflected exactly once.
     First,
-    /// Light that was reflected at least once and at most this often.
+    /// Light that was reflected at least once and at most this number of times.
     Count(usize),
     /// Light that was reflected at least once.
     All,

@@ -1,14 +1,15 @@
-//! A plain diffuse path tracer: the reference for meshes that are no levels of convex blocks.
+//! A plain diffuse path tracer: the reference for meshes that are not levels of convex blocks.
 //!
-//! Paths start at the points that are asked about, leave every surface with a cosine density, and
-//! gather direct light at each hit through a shadow ray. There is no roulette and no importance
-//! sampling of lights beyond that, so there is little that could be wrong.
+//! Paths start at the receivers, leave every surface with a cosine density, and gather direct light at
+//! each hit through a shadow ray. There is no Russian roulette and no other importance sampling, so
+//! little can go wrong.
 
 use crate::geometry::bvh::Bvh;
 use crate::geometry::mesh::{self, MeshError, TriangleMesh};
 use crate::lighting::sampling::{
     cosine_hemisphere_from_square, hash, sobol_point, square_from_unit,
 };
+use crate::lighting::sphere_light::sphere_light_irradiance;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -20,51 +21,53 @@ const SURFACE_OFFSET: f64 = 1e-5;
 pub struct SphereLight {
     /// World position of the centre.
     pub position: DVec3,
-    /// W/sr for each channel.
+    /// Radiant intensity of each channel, W/sr.
     pub intensity: DVec3,
-    /// Metres; 0 for a point. Nearer than this, irradiance grows no further.
+    /// Metres; 0 for a point. Irradiance grows no further within this distance.
     pub radius: f64,
 }
 
 /// A mesh with its lights, ready to be traced. Surfaces reflect and emit on both sides.
 pub struct PathScene {
     bvh: Bvh,
+    /// Unit normal of each triangle.
     normals: Vec<DVec3>,
     /// Albedo of each triangle.
     albedo: Vec<DVec3>,
     /// Emitted radiosity of each triangle; empty if nothing emits.
     emission: Vec<DVec3>,
     lights: Vec<SphereLight>,
+    /// How far off a surface rays start, metres.
     offset: f64,
 }
 
-/// How much work to spend.
+/// How many paths are traced, and how far.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PathSettings {
-    /// Paths from each point; best a power of two.
+    /// Number of paths from each receiver; a power of two is best.
     pub paths: u32,
-    /// Most reflections on a path.
+    /// Largest number of reflections on a path.
     pub bounces: u32,
-    /// Seeds give independent estimates.
+    /// Different seeds give independent estimates.
     pub seed: u32,
 }
 
-/// What arrives at a point, W/m² for each channel.
+/// Irradiance of a receiver, W/m² for each channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PathIrradiance {
-    /// Straight from lights and emitting surfaces.
+    /// Light straight from lights and emitting surfaces.
     pub direct: DVec3,
-    /// After at least one reflection.
+    /// Light that was reflected at least once.
     pub indirect: DVec3,
 }
 
 /// Why a scene cannot be traced.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PathError {
-    /// The mesh makes no sense.
+    /// The mesh is not valid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
-    /// Not one emission for each material.
+    /// There is not one emission for each material.
     #[error("there are {found} emissions; expected none, or {expected}, one for each material")]
     EmissionCount {
         /// Number of materials.
@@ -75,10 +78,10 @@ pub enum PathError {
 }
 
 impl PathScene {
-    /// Prepares a mesh; `emission` holds the radiosity that each material emits, W/m², or nothing.
+    /// Prepares a mesh. `emission` holds the radiosity that each material emits, W/m², or is empty.
     ///
     /// # Errors
-    /// [`PathError`].
+    /// [`PathError`] if the mesh is not valid, or there is not one emission for each material.
     pub fn new(
         mesh: &TriangleMesh,
         lights: Vec<SphereLight>,
@@ -115,9 +118,9 @@ impl PathScene {
     }
 }
 
-/// Irradiance at (point, unit normal) pairs.
+/// Irradiance at receivers, each a point and a unit normal.
 ///
-/// The result depends on the settings and the index of the point, not on the number of threads.
+/// The result of a receiver depends on the settings and on its index, not on the number of threads.
 pub fn irradiance(
     scene: &PathScene,
     receivers: &[(DVec3, DVec3)],
@@ -127,13 +130,12 @@ pub fn irradiance(
         let seed = hash(settings.seed, index as u32);
         let mut sum = PathIrradiance::default();
         for path in 0..settings.paths {
-            add_path(
-                scene,
-                point,
-                normal,
-                (seed, path, settings.bounces),
-                &mut sum,
-            );
+            let path = Path {
+                seed,
+                index: path,
+                bounces: settings.bounces,
+            };
+            path.trace(scene, (point, normal), &mut sum);
         }
         let scale = 1.0 / f64::from(settings.paths.max(1));
         PathIrradiance {
@@ -144,65 +146,72 @@ pub fn irradiance(
     receivers.par_iter().enumerate().map(gather).collect()
 }
 
-/// Adds what one path brings, `(seed, path, bounces)` naming it.
-fn add_path(
-    scene: &PathScene,
-    mut point: DVec3,
-    mut normal: DVec3,
-    (seed, path, bounces): (u32, u32, u32),
-    sum: &mut PathIrradiance,
-) {
-    let mut throughput = DVec3::ONE;
-    // What surfaces emit is reflected as often as lights' light is, and then takes one ray more.
-    let rays = bounces + u32::from(!scene.emission.is_empty());
-    for depth in 0..rays {
-        let square = square_from_unit(sobol_point(path, hash(seed, depth)));
-        let local = cosine_hemisphere_from_square(square);
-        let (tangent, bitangent) = normal.any_orthonormal_pair();
-        let direction = tangent * local.x + bitangent * local.y + normal * local.z;
-        let origin = point + normal * scene.offset;
-        let found = scene
-            .bvh
-            .closest_hit(origin.as_vec3(), direction.as_vec3(), f32::INFINITY);
-        let Some(hit) = found else {
-            return;
-        };
-        let triangle = hit.triangle as usize;
-        point = origin + direction * f64::from(hit.t);
-        normal = scene.normals[triangle];
-        if normal.dot(direction) > 0.0 {
-            normal = -normal;
-        }
-        if let Some(&emitted) = scene.emission.get(triangle) {
-            let arriving = throughput * emitted;
-            if depth == 0 {
-                sum.direct += arriving;
-            } else {
-                sum.indirect += arriving;
+/// One of the paths from a receiver.
+struct Path {
+    seed: u32,
+    index: u32,
+    /// Largest number of reflections.
+    bounces: u32,
+}
+
+impl Path {
+    /// Adds the light that the path brings to its receiver.
+    fn trace(
+        &self,
+        scene: &PathScene,
+        (mut point, mut normal): (DVec3, DVec3),
+        sum: &mut PathIrradiance,
+    ) {
+        let mut throughput = DVec3::ONE;
+        // Emitted light is reflected as often as light from lights, and needs one more ray for it.
+        let rays = self.bounces + u32::from(!scene.emission.is_empty());
+        for depth in 0..rays {
+            let square = square_from_unit(sobol_point(self.index, hash(self.seed, depth)));
+            let local = cosine_hemisphere_from_square(square);
+            let (tangent, bitangent) = normal.any_orthonormal_pair();
+            let direction = tangent * local.x + bitangent * local.y + normal * local.z;
+            let origin = point + normal * scene.offset;
+            let found = scene
+                .bvh
+                .closest_hit(origin.as_vec3(), direction.as_vec3(), f32::INFINITY);
+            let Some(hit) = found else {
+                return;
+            };
+            let triangle = hit.triangle as usize;
+            point = origin + direction * f64::from(hit.t);
+            normal = scene.normals[triangle];
+            if normal.dot(direction) > 0.0 {
+                normal = -normal;
             }
+            if let Some(&emitted) = scene.emission.get(triangle) {
+                let arriving = throughput * emitted;
+                if depth == 0 {
+                    sum.direct += arriving;
+                } else {
+                    sum.indirect += arriving;
+                }
+            }
+            throughput *= scene.albedo[triangle];
+            if depth == self.bounces || throughput == DVec3::ZERO {
+                return;
+            }
+            sum.indirect += throughput * direct_light(scene, point, normal);
         }
-        throughput *= scene.albedo[triangle];
-        if depth == bounces || throughput == DVec3::ZERO {
-            return;
-        }
-        sum.indirect += throughput * direct_light(scene, point, normal);
     }
 }
 
-/// Irradiance straight from the lights.
+/// Irradiance straight from the lights, shadows included.
 fn direct_light(scene: &PathScene, point: DVec3, normal: DVec3) -> DVec3 {
     let origin = point + normal * scene.offset;
     let mut sum = DVec3::ZERO;
     for light in &scene.lights {
-        let to_light = light.position - point;
-        let squared = to_light.length_squared();
-        let cosine = normal.dot(to_light) / squared.sqrt();
-        if cosine.is_nan() || cosine <= 0.0 {
+        let unshadowed = sphere_light_irradiance(light.position - point, normal, light.radius);
+        if unshadowed == 0.0 {
             continue;
         }
         let ray = (light.position - origin).as_vec3();
         if !scene.bvh.is_occluded(origin.as_vec3(), ray, 1.0) {
-            sum += light.intensity * (cosine / squared.max(light.radius * light.radius));
+            sum += light.intensity * unshadowed;
         }
     }
     sum

@@ -10,11 +10,13 @@ use mrt_core::reference::oracle_file::{
     Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceError, ReferenceFile, read,
 };
 use mrt_dictionary::config::BakeConfig;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::SkippedLight;
 use mrt_runtime::blocks::CellsError;
-use mrt_runtime::shadows::Openings;
 use mrt_runtime::{
-    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, FrameError, Level, Light,
-    Outputs, ProbeOrder, Scene,
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, Level, Light, Outputs,
+    ProbeOrder, Scene,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -106,11 +108,11 @@ pub enum AccuracyError {
     },
     /// A light is refused.
     #[error("{scene}: {source}")]
-    Frame {
+    Light {
         /// Name of the reference.
         scene: String,
         /// Why.
-        source: FrameError,
+        source: SkippedLight,
     },
     /// Probe references need probes.
     #[error(
@@ -306,7 +308,12 @@ pub fn compare(
         probes: is_probes.then_some(ProbeOrder::L2),
         vector: false,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let config = FrameConfig {
+        outputs,
+        bounces: frame_bounces(reference, args),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
     (0..reference.lights.len())
         .map(|light| {
             let source = Light::Sphere {
@@ -314,9 +321,11 @@ pub fn compare(
                 radius: 0.0,
                 intensity: Vec3::splat(reference.intensity as f32),
             };
+            frame.set_lights(&[source]);
             frame
-                .solve(&scene, &[source], &Openings, frame_bounces(reference, args))
-                .map_err(|source| AccuracyError::Frame {
+                .solve()
+                .require_all_lights()
+                .map_err(|source| AccuracyError::Light {
                     scene: scene_name(),
                     source,
                 })?;
@@ -421,9 +430,9 @@ fn our_signal(
             // Walls of the reference are walls of the level: both follow from the cells.
             let light = scene
                 .atlas
-                .pixel(block, face, u, v)
+                .pixel(BlockIndex::new(block), face, u, v)
                 .map_or([0.0; 3], |pixel| {
-                    scene.atlas.sample(frame.lightmap(), pixel)
+                    scene.atlas.sample(frame.lightmap().pixels(), pixel)
                 });
             ours.extend(light[..channels].iter().map(|&e| f64::from(e)));
         }
@@ -445,7 +454,7 @@ fn our_probes(
     let mut ours = Vec::with_capacity(9 * points.len());
     for &point in points {
         let light = probes
-            .at(scene, point)
+            .at(&scene.level, point)
             .ok_or_else(|| AccuracyError::ProbeOutside {
                 scene: scene_name(),
                 found: point,

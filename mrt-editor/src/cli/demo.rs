@@ -10,11 +10,9 @@ use crate::render::tone::{auto_exposure, tone_map};
 use crate::render::{Picture, render};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::low_level::level::text::from_text;
-use mrt_runtime::shadows::Openings;
 use mrt_runtime::{
-    AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameError, Level, LevelTextError,
-    Light, Scene, StageTimes,
+    AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameConfig, Level, LevelTextError,
+    Light, Scene, SkippedLight, StageTimes,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -91,7 +89,7 @@ pub enum DemoError {
     Assemble(#[from] AssembleError),
     /// A light is refused.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// Nothing can be seen.
     #[error(transparent)]
     View(#[from] ViewError),
@@ -145,15 +143,17 @@ pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
     let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let assemble_ms = milliseconds(start.elapsed());
     let lights = maze_lights(&scene);
-    let mut frame = Frame::new(&scene);
-    let times = time_frames(&mut frame, &scene, &lights)?;
+    let mut frame = Frame::new(&scene, FrameConfig::default());
+    let times = time_frames(&mut frame, &lights)?;
     let errors = if args.no_exact {
         None
     } else {
         eprintln!("solving the same level exactly, to compare");
         Some(measure(&level, &scene, &mut frame, &lights, BOUNCES)?)
     };
-    frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
+    frame.set_lights(&lights);
+    frame.set_bounces(Bounces::Count(BOUNCES));
+    frame.solve().require_all_lights()?;
     let pictures = take_pictures(args, &level, &scene, &frame, &lights)?;
     let report = report(
         &level,
@@ -183,7 +183,7 @@ fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
             }
         }
     };
-    from_text(&text).map_err(|source| DemoError::Level { place, source })
+    Level::from_text(&text).map_err(|source| DemoError::Level { place, source })
 }
 
 /// A warm light in the first block and a cool one in the block farthest from it.
@@ -219,17 +219,16 @@ fn block_size(warp: &Hexahedron) -> f32 {
 }
 
 /// The fastest of several frames of one bounce, each computed anew.
-fn time_frames(
-    frame: &mut Frame,
-    scene: &Scene,
-    lights: &[Light],
-) -> Result<StageTimes, FrameError> {
+fn time_frames(frame: &mut Frame, lights: &[Light]) -> Result<StageTimes, SkippedLight> {
+    frame.set_lights(lights);
+    frame.set_bounces(Bounces::Count(1));
     let mut best: Option<StageTimes> = None;
     for _ in 0..TIMED_FRAMES {
         // Nothing changes between them, and a frame skips what has not changed.
         frame.forget();
-        frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
-        let times = frame.times();
+        let report = frame.solve();
+        report.require_all_lights()?;
+        let times = report.times();
         if best.is_none_or(|best| times.total() < best.total()) {
             best = Some(times);
         }
@@ -348,7 +347,7 @@ fn report(
             ("b = T_d->b l", milliseconds(times.coefficients)),
             ("r = T_b->r b", milliseconds(times.responses)),
             ("U_b b + U_r r", milliseconds(times.indirect)),
-            ("lightmap atlas", milliseconds(times.atlas)),
+            ("lightmap atlas", milliseconds(times.lightmap)),
         ],
         frame_ms: milliseconds(times.total()),
         errors,

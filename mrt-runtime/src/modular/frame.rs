@@ -239,15 +239,15 @@ impl Frame {
                 })
             });
             let Some(old) = old else { continue };
-            for texel in 0..placed.texels.len() {
-                let slots = (from.layout.slot(old, texel), to.layout.slot(block, texel));
-                if let (Some(from), Some(to)) = slots {
-                    let irradiance = self.light.indirect.get(from);
-                    next.light.indirect.set(to, irradiance);
+            let rank = to.layout.rank[block.get()];
+            let texel_of_slot = &to.layout.texel_of_slot[to.layout.shape(rank)];
+            for (slot, &texel) in to.layout.slots(rank).zip(texel_of_slot) {
+                if let Some(shown) = from.layout.slot(old, texel as usize) {
+                    let irradiance = self.light.indirect.get(shown);
+                    next.light.indirect.set(slot, irradiance);
                 }
             }
             let old = &self.schedule.state[from.layout.rank[old.get()].get()];
-            let rank = to.layout.rank[block.get()];
             if old.has_indirect {
                 next.schedule.state[rank.get()].has_indirect = true;
                 next.schedule.touch(rank, f32::INFINITY);

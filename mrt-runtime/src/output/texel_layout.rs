@@ -34,9 +34,10 @@ pub struct TexelLayout {
     pub slots: Vec<Range<usize>>,
     /// By rank: index of the block's shape in the lists of the scene, and in those below.
     pub shapes: Vec<u32>,
-    /// By shape: the slot of each texel, within the block.
+    /// By shape: the first slot of each texel, within the block.
     pub slot_of_texel: Vec<Vec<u32>>,
-    /// By shape: the texel in each slot of the block; `u32::MAX` where there is none.
+    /// By shape: the texel in each slot of the block; `u32::MAX` where there is none. A texel that lies on a mirror of the
+    /// shape has several slots.
     pub texel_of_slot: Vec<Vec<u32>>,
 }
 

@@ -1,15 +1,18 @@
-//! Where the ground truth is. The build script `tests/build.rs` includes this file, which therefore imports nothing
-//! of this crate.
+//! Finds the folders of ground truth.
+//!
+//! The build script `tests/build.rs` includes this file, which therefore imports nothing of this crate.
 
 use std::path::{Path, PathBuf};
 
-/// The folder of reference files, `oracle`, if it exists: see [`ground_truth_folder`].
+/// The folder of reference files, `oracle`, if it exists; see [`ground_truth_folder`].
 pub fn oracle_folder() -> Option<PathBuf> {
     ground_truth_folder("oracle")
 }
 
-/// A folder of ground truth, such as `oracle`, if it exists: the one of that name in the folder that the environment
-/// variable `MRT_SHARED` names, or else in a folder `shared` in this package or any folder above it.
+/// A folder of ground truth, if it exists.
+///
+/// It is `name` in the folder that the environment variable `MRT_SHARED` names. If that is not set, it
+/// is `shared/name` in the folder of this package or in any folder above it.
 pub fn ground_truth_folder(name: &str) -> Option<PathBuf> {
     if let Some(shared) = std::env::var_os("MRT_SHARED").filter(|shared| !shared.is_empty()) {
         return Some(PathBuf::from(shared).join(name)).filter(|folder| folder.is_dir());

@@ -1,24 +1,23 @@
 //! Direct light with exact visibility: a walk from texel to light, block by block.
 
+use super::quarters::Quarters;
+use super::scene::{ExactScene, Side, winding};
 use glam::DVec3;
 use rayon::prelude::*;
-
-use super::transport::Quarters;
-use super::{ExactScene, Side, winding};
 
 /// An isotropic diffuse sphere, or a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointLight {
     /// World position of the centre; a light outside all blocks lights nothing.
     pub position: DVec3,
-    /// W/sr.
+    /// Radiant intensity, W/sr.
     pub intensity: f64,
-    /// Metres; 0 for a point. Nearer than this, irradiance grows no further.
+    /// Metres; 0 for a point. Irradiance grows no further within this distance.
     pub radius: f64,
 }
 
 impl PointLight {
-    /// A point of unit intensity, as in the reference files.
+    /// A point light of intensity 1 W/sr.
     pub fn unit(position: DVec3) -> Self {
         Self {
             position,
@@ -28,7 +27,7 @@ impl PointLight {
     }
 }
 
-/// Direct irradiance at every texel centre, W/m²: I cos / max(d², r²) where the centre of the light
+/// Direct irradiance at every texel centre, W/m²: I cos θ / max(d², r²) where the centre of the light
 /// is visible.
 pub fn direct(scene: &ExactScene, light: &PointLight) -> Vec<f64> {
     direct_on_grid(scene, light, 1, 1, |_| true)
@@ -41,14 +40,14 @@ pub fn direct_mean(scene: &ExactScene, light: &PointLight, samples: usize) -> Ve
 
 /// Direct irradiance as the area means over `samples`² points of every quarter of a texel, W/m².
 ///
-/// The source of indirect light: what a texel sends out is its mean, not its centre's value, and
+/// This is the source of indirect light: a texel sends out its mean, not the value at its centre, and
 /// direct light varies most within a texel where it is strongest. Cost: one walk a point, about 0.1
 /// microseconds.
 pub fn direct_quarters(scene: &ExactScene, light: &PointLight, samples: usize) -> Vec<Quarters> {
     direct_quarters_in(scene, light, samples, |_| true)
 }
 
-/// As [`direct_quarters`], in the blocks that `is_wanted` names; elsewhere zero.
+/// [`direct_quarters`] in the blocks for which `is_wanted` is true, and zero elsewhere.
 pub fn direct_quarters_in(
     scene: &ExactScene,
     light: &PointLight,
@@ -65,7 +64,8 @@ pub fn direct_quarters_in(
     (0..scene.texel_count()).map(quarters).collect()
 }
 
-/// Means over `samples`² points of every cell of a grid `refinement` times finer than the texels, in the blocks wanted.
+/// Means over `samples`² points of every cell of a grid that is `refinement` times finer than the
+/// texels, in the blocks for which `is_wanted` is true, and zero elsewhere.
 fn direct_on_grid(
     scene: &ExactScene,
     light: &PointLight,
@@ -106,6 +106,7 @@ fn direct_on_grid(
         .collect()
 }
 
+/// Direct irradiance at a point in or on `block`, W/m².
 fn direct_at(
     scene: &ExactScene,
     block: usize,
@@ -116,18 +117,18 @@ fn direct_at(
     let to_light = light.position - point;
     let squared = to_light.length_squared();
     let cosine = normal.dot(to_light) / squared.sqrt();
-    // NaN, for a point light on the surface itself, is no light either.
+    // The cosine is NaN for a point light at the point itself; that gives no light either.
     if cosine.is_nan() || cosine <= 0.0 || !is_visible(scene, block, point, to_light) {
         return 0.0;
     }
     light.intensity * cosine / squared.max(light.radius * light.radius)
 }
 
-/// True when the segment from `point`, in or on `block`, to `point + to_light` meets only openings.
+/// True if the segment from `point`, in or on `block`, to `point + to_light` meets only openings.
 fn is_visible(scene: &ExactScene, mut block: usize, point: DVec3, to_light: DVec3) -> bool {
-    // Segments through an edge belong to several faces; within rounding, an opening wins.
+    // A segment through an edge meets several faces at once. Within this tolerance the opening wins.
     const TIE: f64 = 1e-12;
-    // Each block is crossed once at most.
+    // A segment crosses each block at most once.
     for _ in 0..scene.blocks.len() {
         let mut exit = (1.0, None);
         for (side, facets) in scene.sides[block].iter().zip(&scene.facets[block]) {

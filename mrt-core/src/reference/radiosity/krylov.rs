@@ -1,12 +1,14 @@
-//! Solves x - G x = b by the generalised minimal residual method (Saad and Schultz 1986), which
-//! needs a few dozen products where the plain series, at albedo 0.95, needs hundreds.
+//! Solves x - G x = b by the generalised minimal residual method (GMRES, Saad and Schultz 1986).
+//!
+//! It takes a few dozen products with G where the plain series, at albedo 0.95, takes hundreds.
 
-use super::ExactError;
+use super::error::ExactError;
+use crate::linalg::matrix::dot;
 
-/// Products after which the method gives up; mazes at albedo 0.95 take about forty.
+/// Number of products after which the method gives up; mazes at albedo 0.95 take about forty.
 const MAX_STEPS: usize = 200;
 
-/// The x for which x - `gain`(x) = b, with a residual of at most `tolerance` times |b|.
+/// The x for which x - `gain`(x) = b. The residual is at most `tolerance` times |b|.
 ///
 /// # Errors
 /// [`ExactError::NotConverged`], or what `gain` returns.
@@ -20,7 +22,7 @@ pub(super) fn solve_gain(
         return Ok(vec![0.0; b.len()]);
     }
     let mut basis = vec![scaled(b, 1.0 / size)];
-    // Column k of the Hessenberg matrix after its rotations: upper triangular.
+    // Columns of the Hessenberg matrix after its rotations, which make it upper triangular.
     let mut triangle: Vec<Vec<f64>> = Vec::new();
     let mut rotations: Vec<(f64, f64)> = Vec::new();
     let mut right = vec![size];
@@ -59,6 +61,7 @@ pub(super) fn solve_gain(
     })
 }
 
+/// The combination of `basis` whose weights solve the triangular system.
 fn combine(basis: &[Vec<f64>], triangle: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
     let count = triangle.len();
     let mut weights = right[..count].to_vec();
@@ -73,10 +76,6 @@ fn combine(basis: &[Vec<f64>], triangle: &[Vec<f64>], right: &[f64]) -> Vec<f64>
         add_scaled(&mut sum, vector, weight);
     }
     sum
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    crate::linalg::matrix::dot(a, b)
 }
 
 fn norm(a: &[f64]) -> f64 {
@@ -99,7 +98,7 @@ mod tests {
 
     #[test]
     fn the_residual_meets_its_tolerance() {
-        // A rotation by 90 degrees and a shrinking: eigenvalues that are not real.
+        // The operator turns by 90 degrees and shrinks, so its eigenvalues are not real.
         let gain = |x: &[f64]| Ok(vec![-0.9 * x[1], 0.9 * x[0], 0.5 * x[2] + 0.1 * x[0]]);
         let b = [1.0, 2.0, -3.0];
         let x = solve_gain(gain, &b, 1e-12).unwrap();

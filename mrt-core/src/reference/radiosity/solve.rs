@@ -1,8 +1,10 @@
 //! From direct light to indirect irradiance, through any number of bounces.
 
+use super::error::{ExactError, check_length};
 use super::krylov::solve_gain;
-use super::transport::{Quarters, Transport};
-use super::{ExactError, ExactScene, check_length};
+use super::quarters::{Quarters, quarters_from_centers};
+use super::scene::ExactScene;
+use super::transport::Transport;
 use crate::reference::bounces::Bounces;
 
 /// Relative residual of the solution for all bounces.
@@ -10,11 +12,13 @@ pub const ALL_BOUNCES_TOLERANCE: f64 = 1e-7;
 
 /// Indirect irradiance at texel centres, W/m².
 ///
-/// `direct` is the direct irradiance ([`super::direct::direct_quarters`]); `albedo`
-/// holds one value for each texel, in [0, 1], below 1 for [`Bounces::All`].
+/// `direct` is the direct irradiance ([`direct_quarters`](super::direct::direct_quarters)). `albedo`
+/// holds one value for each texel, in [0, 1], and below 1 for [`Bounces::All`].
 ///
 /// # Errors
-/// [`ExactError::Length`], [`ExactError::Albedo`], [`ExactError::NotConverged`].
+/// - [`ExactError::Length`] if an input does not have one value for each texel.
+/// - [`ExactError::Albedo`] for an albedo out of range.
+/// - [`ExactError::NotConverged`] if [`Bounces::All`] misses [`ALL_BOUNCES_TOLERANCE`].
 pub fn solve(
     scene: &ExactScene,
     transport: &Transport,
@@ -53,7 +57,7 @@ pub fn solve(
     }
 }
 
-/// [`solve`] for three channels of albedo and white light; an irradiance for each texel and channel.
+/// [`solve`] for three channels of albedo and white light: irradiance by texel and channel.
 ///
 /// # Errors
 /// As [`solve`].
@@ -75,52 +79,7 @@ pub fn solve_rgb(
     Ok(irradiance)
 }
 
-/// Means over texel quarters of a function known at texel centres: the texel's mean and its slopes.
-///
-/// The mean is the centre's value plus 1/24 of the second differences along u and v, to fourth
-/// order. Against the reference files that is worth little (all bounces at albedo 0.9 in the cube err
-/// by 0.05 % instead of 0.17 % in the mean of a wall; two bounces by 0.06 % either way), and more
-/// than reflecting the function at the edges of a face, where it is steepest.
-pub fn quarters_from_centers(scene: &ExactScene, centers: &[f64]) -> Vec<Quarters> {
-    let resolution = scene.resolution();
-    if resolution < 3 {
-        return centers.iter().map(|&center| [center; 4]).collect();
-    }
-    let mut quarters = Vec::with_capacity(centers.len());
-    for centers in centers.chunks_exact(resolution * resolution) {
-        for (index, &center) in centers.iter().enumerate() {
-            let (row, column) = (index / resolution, index % resolution);
-            let (slope_u, bend_u) = derivatives(centers, index, column, resolution, 1);
-            let (slope_v, bend_v) = derivatives(centers, index, row, resolution, resolution);
-            let mean = center + (bend_u + bend_v) / 24.0;
-            let (u, v) = (0.25 * slope_u, 0.25 * slope_v);
-            quarters.push([mean - u - v, mean + u - v, mean - u + v, mean + u + v]);
-        }
-    }
-    quarters
-}
-
-/// First and second derivative, in texels, of a row of `count` values `stride` apart, at `index`,
-/// the one at `position`; at an end, of the parabola through the last three.
-fn derivatives(
-    values: &[f64],
-    index: usize,
-    position: usize,
-    count: usize,
-    stride: usize,
-) -> (f64, f64) {
-    let (middle, offset) = if position == 0 {
-        (index + stride, -1.0)
-    } else if position == count - 1 {
-        (index - stride, 1.0)
-    } else {
-        (index, 0.0)
-    };
-    let (before, after) = (values[middle - stride], values[middle + stride]);
-    let bend = before - 2.0 * values[middle] + after;
-    (0.5 * (after - before) + offset * bend, bend)
-}
-
+/// Refuses an albedo for which there is no solution.
 fn check_albedo(albedo: &[f64], bounces: Bounces) -> Result<(), ExactError> {
     let all = bounces == Bounces::All;
     let is_allowed = |a: f64| (0.0..=1.0).contains(&a) && !(all && a == 1.0);

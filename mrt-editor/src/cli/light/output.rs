@@ -8,6 +8,7 @@ use crate::render::lit::LitScene;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::Vec3;
 use mrt_core::container::write_file_atomically;
+use mrt_runtime::BlockIndex;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -108,7 +109,7 @@ fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
             let (u, v) = (receiver.u as f32, receiver.v as f32);
             let uv = lit
                 .atlas
-                .texture_coordinate(receiver.block, receiver.face, u, v)
+                .texture_coordinate(BlockIndex::new(receiver.block), receiver.face, u, v)
                 .unwrap_or_default();
             let next = coordinates.len() + 1;
             let coordinate = *coordinates

@@ -13,6 +13,7 @@ use crate::modular::scene::SceneBlock;
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::polar_decomposition::rotation_part;
 
 /// The blocks of a checked level in their canonical frames, with `dictionary.resolution`² texels a wall.
 ///
@@ -177,14 +178,7 @@ fn crossing(
 /// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the
 /// middle, by Newton's iteration for the polar decomposition (Higham 1986).
 fn rotation_of(warp: &Hexahedron) -> DMat3 {
-    let jacobian = warp.jacobian(DVec3::splat(0.5));
-    // Near one in size it converges in a few steps, each of which doubles the digits.
-    let size = jacobian.determinant().cbrt();
-    let mut rotation = jacobian * (1.0 / size);
-    for _ in 0..POLAR_STEPS {
-        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
-    }
-    rotation
+    rotation_part(&warp.jacobian(DVec3::splat(0.5)), POLAR_STEPS)
 }
 
 /// Steps of the polar decomposition: warps that pass the level's check are stretched by up to 1e6.

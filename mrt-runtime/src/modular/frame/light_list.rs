@@ -15,7 +15,10 @@ pub struct LightId {
 
 impl fmt::Display for LightId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}.{}", self.slot, self.generation)
+        match self.generation {
+            0 => self.slot.fmt(f),
+            generation => write!(f, "{}.{generation}", self.slot),
+        }
     }
 }
 

@@ -37,6 +37,14 @@ impl FrameReport {
         &self.0.skipped
     }
 
+    /// The first light that did not shine, as an error: for tools, whose lights must all shine.
+    ///
+    /// # Errors
+    /// [`SkippedLight`], if there is one.
+    pub fn require_all_lights(&self) -> Result<(), SkippedLight> {
+        self.0.skipped.first().map_or(Ok(()), |&light| Err(light))
+    }
+
     /// Blocks whose indirect light was written, in no order; what [`Frame::probes`](crate::modular::frame::Frame::probes)
     /// has for all others is as it was.
     pub fn changed_blocks(&self) -> &[BlockIndex] {

@@ -5,6 +5,7 @@ use crate::light::limits::MAX_LIGHT_VALUE;
 use crate::modular::scene::SceneData;
 use crate::output::texel_layout::{BlockRank, Planes};
 use glam::Vec3;
+use mrt_core::geometry::cube::Face;
 
 /// Colours of the texels of a level, by slot. Slots without a texel, and texels in holes, have none.
 #[derive(Clone, Debug)]
@@ -70,15 +71,7 @@ impl Surface {
         let mut emits = vec![false; layout.block_count()];
         for rank in layout.ranks() {
             let placed = &scene.level.blocks[layout.order[rank.get()].get()];
-            let texels = placed.shape.texels(scene.level.resolution);
-            let slots = &layout.slot_of_texel[layout.shape(rank)];
-            let start = layout.slots(rank).start;
-            for ((face, unit), &slot) in texels.zip(slots) {
-                // What is in a hole neither reflects nor emits.
-                if placed.shape.is_in_hole(face, unit) {
-                    continue;
-                }
-                let slot = start + slot as usize;
+            for (slot, _, face) in wall_slots(scene, rank) {
                 let emission = placed.emission[face.index()];
                 surface.albedo.set(slot, placed.albedo[face.index()]);
                 surface.emission.set(slot, emission);
@@ -122,18 +115,28 @@ impl Surface {
 
 /// Writes colours of the texels that are not in holes; the block and the number of values have been checked.
 fn write(scene: &SceneData, block: BlockIndex, values: &[Vec3], plane: &mut Planes) -> BlockRank {
-    let layout = &scene.layout;
-    let rank = layout.rank[block.get()];
-    let shape = scene.level.blocks[block.get()].shape;
-    let start = layout.slots(rank).start;
-    let slots = &layout.slot_of_texel[layout.shape(rank)];
-    let texels = shape.texels(scene.level.resolution);
-    for (((face, center), &slot), &value) in texels.zip(slots).zip(values) {
-        if !shape.is_in_hole(face, center) {
-            plane.set(start + slot as usize, value);
-        }
+    let rank = scene.layout.rank[block.get()];
+    for (slot, texel, _) in wall_slots(scene, rank) {
+        plane.set(slot, values[texel]);
     }
     rank
+}
+
+/// Slots of a block that show a wall, with the texel and its face. A texel that lies on a mirror has several slots; what is
+/// in a hole neither reflects nor emits.
+fn wall_slots(
+    scene: &SceneData,
+    rank: BlockRank,
+) -> impl Iterator<Item = (usize, usize, Face)> + '_ {
+    let layout = &scene.layout;
+    let shape = scene.level.blocks[layout.order[rank.get()].get()].shape;
+    let texels: Vec<_> = shape.texels(scene.level.resolution).collect();
+    let slots = layout.slots(rank);
+    let with_texels = slots.zip(&layout.texel_of_slot[layout.shape(rank)]);
+    with_texels.filter_map(move |(slot, &texel)| {
+        let &(face, center) = texels.get(texel as usize)?;
+        (!shape.is_in_hole(face, center)).then_some((slot, texel as usize, face))
+    })
 }
 
 /// Checks values named `what`, each channel of which is to be in [0, `largest`].
