@@ -8,6 +8,7 @@ pub mod warped;
 use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::geometry::cube::Face;
+use mrt_core::reference::oracle_file::{ReferenceFile, oracle_folder, read};
 use mrt_core::reference::radiosity::{ExactScene, Side};
 use mrt_runtime::BlockIndex;
 use mrt_runtime::FrameConfig;
@@ -31,6 +32,13 @@ pub fn default_dictionary() -> &'static Dictionary {
         Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
             .expect("the committed dictionary is sound")
     })
+}
+
+/// The reference file of this name in the folder `oracle`. A test that calls this is ignored where the folder is
+/// absent.
+pub fn reference(name: &str) -> ReferenceFile {
+    let folder = oracle_folder().expect("shared/oracle exists");
+    read(&folder.join(format!("{name}.json"))).expect("the reference file is sound")
 }
 
 /// A level of unit cells at floor height 0, given by (x, z).

@@ -11,7 +11,7 @@
 //! equations 7 to 9 (irradiance); J. Ivanic and K. Ruedenberg, J. Phys. Chem. 1996, 100, 6342 with
 //! the correction of 1998, 102, 9099 (rotation).
 
-use crate::linalg::matrix::{Matrix, Scalar};
+use crate::linalg::matrix::{Matrix, Real};
 use glam::{DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -85,7 +85,7 @@ pub fn evaluate_f32(direction: Vec3, basis: &mut [f32]) {
 ///
 /// # Panics
 /// If their number is not 1, 4, 9, 16 or 25.
-pub fn value<T: Scalar>(coefficients: &[T], direction: DVec3) -> f64 {
+pub fn value<T: Real>(coefficients: &[T], direction: DVec3) -> f64 {
     with_basis(coefficients.len(), direction, |basis| {
         let terms = coefficients.iter().zip(basis);
         terms.map(|(c, b)| c.to_f64() * b).sum()
@@ -201,7 +201,7 @@ pub fn irradiance_from_radiance(coefficients: &mut [f64]) {
 ///
 /// # Panics
 /// If the number of coefficients is not 1, 4, 9, 16 or 25.
-pub fn irradiance<T: Scalar>(radiance: &[T], normal: DVec3) -> f64 {
+pub fn irradiance<T: Real>(radiance: &[T], normal: DVec3) -> f64 {
     with_basis(radiance.len(), normal, |basis| {
         let mut sum = 0.0;
         for (l, lobe) in COSINE_LOBE[..order_of(basis.len())].iter().enumerate() {

@@ -5,24 +5,24 @@
     reason = "intrinsics; the types below are made only where the machine has their instructions"
 )]
 
-use super::Kernel;
+use super::kernel::Kernel;
 use super::lanes::{F16_EXPONENT, Lanes};
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Proof of SSE2.
+/// Proof that the machine has SSE2.
 #[derive(Clone, Copy, Debug)]
 pub struct Sse2(());
 
-/// Proof of AVX2, FMA and F16C.
+/// Proof that the machine has AVX2, FMA and F16C.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
-/// Proof of AVX-512 F and VL, and of what [`Avx2`] proves.
+/// Proof that the machine has AVX-512 F and VL, and all that [`Avx2`] proves.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(());
 
-/// What the machine has: asked once, since kernels are many and short.
+/// What the machine has. It is asked once, because kernels are many and short.
 static FOUND: AtomicU8 = AtomicU8::new(UNKNOWN);
 const UNKNOWN: u8 = 0;
 const BASELINE: u8 = 1;
@@ -62,25 +62,31 @@ pub(super) fn has_avx512() -> bool {
     found() == AVX512
 }
 
-/// SSE2 belongs to x86-64.
+/// Runs a kernel with SSE2, which every x86-64 has.
 pub(super) fn run_sse2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Sse2(()))
 }
 
-/// Call only where [`has_avx2`].
+/// Runs a kernel with AVX2.
+///
+/// # Panics
+/// If the machine lacks it: call only where [`has_avx2`].
 pub(super) fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     #[target_feature(enable = "avx2,fma,f16c")]
     fn run<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx2(()))
     }
     assert!(has_avx2());
-    // SAFETY: the machine has the instructions, as was just asked.
+    // SAFETY: the machine has the instructions, as was just asserted.
     unsafe { run(kernel) }
 }
 
-/// Call only where [`has_avx512`].
+/// Runs a kernel with AVX-512.
+///
+/// # Panics
+/// If the machine lacks it: call only where [`has_avx512`].
 pub(super) fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
-    // With VL, kernels of eight lanes have all 32 registers too.
+    // With VL, kernels of eight lanes can use all 32 registers too.
     #[target_feature(enable = "avx512f,avx512vl,avx2,fma,f16c")]
     fn run<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx512(()))

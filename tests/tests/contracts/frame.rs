@@ -346,8 +346,8 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
     const RIM: f64 = 1e-6;
     for block in [0, 1] {
         for texel in scene.level.blocks[block].texels.clone() {
-            let position = position_of(&scene, texel).as_dvec3();
-            let normal = normal_of(&scene, texel).as_dvec3();
+            let position = position_of(scene, texel).as_dvec3();
+            let normal = normal_of(scene, texel).as_dvec3();
             let distance = (2.0 - position.x) / -direction.x;
             let door = position - direction * distance;
             let depth = door.y.min(1.0 - door.y).min(door.z.min(1.0 - door.z));

@@ -6,7 +6,6 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
-use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_runtime::BlockIndex;
 use mrt_runtime::FrameConfig;
@@ -15,7 +14,7 @@ use mrt_runtime::{Bounces, Frame, Level, Scene};
 use mrt_tests::FrameForTests;
 use mrt_tests::{
     Random, assembled, by_texel, closed_floor_plans, exact_of, floor_plan, in_level_order,
-    random_cells, solved, sphere,
+    random_cells, reference, solved, sphere,
 };
 
 /// Largest step of uniform light, as a fraction of it.
@@ -164,12 +163,10 @@ const STEP_OF_BRIGHTEST: f64 = 0.08;
 const MOST_STEPS: f64 = 0.17;
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn joined_walls_of_the_reference_levels_show_no_step() {
-    let Some(folder) = oracle_folder_or_report("steps in the reference levels") else {
-        return;
-    };
     for name in ["corridor5", "l_turn"] {
-        let reference = read(&folder.join(format!("{name}.json"))).expect("sound");
+        let reference = reference(name);
         let level = Level::from_cells(&reference.cells, Vec3::splat(0.7)).expect("a level");
         let lights: Vec<Vec3> = reference.lights.iter().map(|p| p.as_vec3()).collect();
         check(name, &level, &lights);

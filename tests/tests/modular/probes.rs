@@ -44,7 +44,7 @@ fn lit(scene: &Scene, position: Vec3, order: ProbeOrder) -> Frame {
     let mut frame = Frame::new(
         scene,
         FrameConfig {
-            outputs: outputs,
+            outputs,
             ..FrameConfig::default()
         },
     );

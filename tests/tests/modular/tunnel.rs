@@ -201,8 +201,8 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
     let receivers: Vec<(DVec3, DVec3)> = (0..scene.texel_count())
         .map(|k| {
             (
-                position_of(&scene, k).as_dvec3(),
-                normal_of(&scene, k).as_dvec3(),
+                position_of(scene, k).as_dvec3(),
+                normal_of(scene, k).as_dvec3(),
             )
         })
         .map(|(p, n)| (p + n * LIFT, n))

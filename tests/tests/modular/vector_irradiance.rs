@@ -92,7 +92,7 @@ fn errors(position: Vec3, tilt: std::ops::Range<usize>) -> f64 {
     let mut frame = Frame::new(
         &scene,
         FrameConfig {
-            outputs: outputs,
+            outputs,
             ..FrameConfig::default()
         },
     );
@@ -169,7 +169,7 @@ fn vector_irradiance_crosses_openings_and_follows_the_wall() {
     let mut frame = Frame::new(
         &scene,
         FrameConfig {
-            outputs: outputs,
+            outputs,
             ..FrameConfig::default()
         },
     );

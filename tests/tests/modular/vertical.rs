@@ -3,7 +3,6 @@
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
-use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
@@ -11,7 +10,7 @@ use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Level, Scene};
 use mrt_tests::FrameForTests;
 use mrt_tests::normal_of;
 use mrt_tests::position_of;
-use mrt_tests::{Random, by_texel, largest_difference, solved, sphere};
+use mrt_tests::{Random, by_texel, largest_difference, reference, solved, sphere};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -82,9 +81,9 @@ fn by_place(scene: &Scene, signal: &[[f32; 3]], turn: CubeRotation) -> HashMap<[
     (0..scene.texel_count())
         .map(|texel| {
             let middle = DVec3::splat(0.5);
-            let position = position_of(&scene, texel).as_dvec3() - middle;
+            let position = position_of(scene, texel).as_dvec3() - middle;
             let [a, b, c] = whole(turn.direction(position));
-            let [d, e, f] = whole(turn.direction(normal_of(&scene, texel).as_dvec3()));
+            let [d, e, f] = whole(turn.direction(normal_of(scene, texel).as_dvec3()));
             ([a, b, c, d, e, f], signal[texel])
         })
         .collect()
@@ -136,11 +135,9 @@ fn no_direction_is_special() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn a_stack_is_within_the_bounds_of_the_standard_preset() {
-    let Some(folder) = oracle_folder_or_report("stacked blocks") else {
-        return;
-    };
-    let reference = read(&folder.join("stack3.json")).expect("sound");
+    let reference = reference("stack3");
     let mut config = BakeConfig::preset("standard").expect("a preset");
     config.shapes = "cubes-3d".to_owned();
     // Enough for a stack of four, and a fraction of the time.

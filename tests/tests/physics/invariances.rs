@@ -76,8 +76,8 @@ fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f
 
 /// Place and direction of a texel as whole numbers: texel centres are multiples of 1/32 at 16².
 fn place(scene: &Scene, texel: usize, map: impl Fn(Vec3) -> Vec3) -> [i32; 6] {
-    let position = map(position_of(&scene, texel)) * 64.0;
-    let normal = map(normal_of(&scene, texel)) - map(Vec3::ZERO);
+    let position = map(position_of(scene, texel)) * 64.0;
+    let normal = map(normal_of(scene, texel)) - map(Vec3::ZERO);
     let whole = |v: Vec3| v.round().as_ivec3().to_array();
     let ([a, b, c], [d, e, f]) = (whole(position), whole(normal));
     [a, b, c, d, e, f]
@@ -324,7 +324,7 @@ fn a_mirrored_corridor_has_mirrored_light() {
     let (scene, left) = indirect(&level, &at(1.25), CONVERGED);
     let (other, right) = indirect(&level, &at(4.75), CONVERGED);
     let by_place = |scene: &Scene, texel: usize, mirror: bool| {
-        let (mut p, mut n) = (position_of(&scene, texel), normal_of(&scene, texel));
+        let (mut p, mut n) = (position_of(scene, texel), normal_of(scene, texel));
         if mirror {
             (p.x, n.x) = (6.0 - p.x, -n.x);
         }

@@ -5,9 +5,7 @@ use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_core::reference::bounces::Bounces;
 use mrt_core::reference::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
-use mrt_core::reference::oracle_file::{
-    Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read,
-};
+use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
 use mrt_dictionary::config::{BakeConfig, PriorConfig};
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::modular::light_prior::cube::{direct_samples, light_prior};
@@ -20,8 +18,7 @@ use mrt_runtime::blocks::Shape;
 use mrt_runtime::{
     AssembleConfig, AssembleError, Bounces as Passes, Coupling, Dictionary, Frame, Level, Scene,
 };
-use mrt_tests::{CONVERGED, default_dictionary, solved, sphere};
-use std::path::Path;
+use mrt_tests::{CONVERGED, default_dictionary, reference, solved, sphere};
 use std::sync::OnceLock;
 
 /// Levels of white walls.
@@ -44,10 +41,6 @@ impl Pair {
     fn error(&self) -> f64 {
         rel_l2(&self.ours, &self.theirs)
     }
-}
-
-fn reference(folder: &Path, name: &str) -> ReferenceFile {
-    read(&folder.join(format!("{name}.json"))).expect("the reference file is sound")
 }
 
 /// The reference's level with its own colours, or `albedo` everywhere.
@@ -155,14 +148,10 @@ fn preset(name: &str) -> &'static Dictionary {
 
 /// Errors of the first bounce in white levels, means over all lights: over the whole level, and over the blocks
 /// at 0, 1, 2 and 3 or more openings.
-fn first_bounce_errors(
-    folder: &Path,
-    dictionary: &Dictionary,
-    coupling: Coupling,
-) -> [f64; 1 + HOP_GROUPS] {
+fn first_bounce_errors(dictionary: &Dictionary, coupling: Coupling) -> [f64; 1 + HOP_GROUPS] {
     let mut groups: [Vec<f64>; 1 + HOP_GROUPS] = Default::default();
     for name in WHITE {
-        let reference = reference(folder, name);
+        let reference = reference(name);
         let pairs = solve_all(&reference, dictionary, coupling, Bounces::First, 1.0);
         for (light, pair) in pairs.iter().enumerate() {
             groups[0].push(pair.error());
@@ -185,10 +174,7 @@ fn first_bounce_errors(
 
 /// Bounds for the whole level, and for 1, 2, and 3 or more openings.
 fn check_first_bounce(name: &str, bounds: [f64; 4]) {
-    let Some(folder) = oracle_folder_or_report("first bounce in white levels") else {
-        return;
-    };
-    let [whole, _, one, two, more] = first_bounce_errors(&folder, preset(name), Coupling::Table);
+    let [whole, _, one, two, more] = first_bounce_errors(preset(name), Coupling::Table);
     for (what, error, bound) in [
         ("whole level", whole, bounds[0]),
         ("one opening", one, bounds[1]),
@@ -200,33 +186,35 @@ fn check_first_bounce(name: &str, bounds: [f64; 4]) {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn the_first_bounce_in_white_levels_is_within_the_bounds_at_every_distance() {
     check_first_bounce("standard", [0.020, 0.022, 0.030, 0.06]);
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn the_first_bounce_of_the_mobile_preset_is_within_the_bounds() {
     check_first_bounce("mobile", [0.08, 0.09, 0.10, 0.14]);
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn the_first_bounce_of_the_high_preset_is_within_the_bounds() {
     // Measured: 0.64, 0.93, 1.68 and 3.90 %. It is for half the time of the quality preset.
     check_first_bounce("high", [0.008, 0.013, 0.018, 0.04]);
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn the_first_bounce_of_the_quality_preset_is_within_the_bounds() {
     check_first_bounce("quality", [0.008, 0.009, 0.015, 0.04]);
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn whole_paths_are_no_worse_than_lightfields_passed_on() {
-    let Some(folder) = oracle_folder_or_report("table against lightfields") else {
-        return;
-    };
-    let table = first_bounce_errors(&folder, default_dictionary(), Coupling::Table);
-    let fields = first_bounce_errors(&folder, default_dictionary(), Coupling::Lightfield);
+    let table = first_bounce_errors(default_dictionary(), Coupling::Table);
+    let fields = first_bounce_errors(default_dictionary(), Coupling::Lightfield);
     for openings in [2, 3] {
         let (table, fields) = (table[1 + openings], fields[1 + openings]);
         assert!(
@@ -242,9 +230,9 @@ fn whole_paths_are_no_worse_than_lightfields_passed_on() {
 }
 
 /// Mean over all lights of the white levels.
-fn all_bounces_error(folder: &Path, dictionary: &Dictionary, albedo: f64) -> f64 {
+fn all_bounces_error(dictionary: &Dictionary, albedo: f64) -> f64 {
     let error = mean(WHITE.iter().flat_map(|name| {
-        let reference = reference(folder, name);
+        let reference = reference(name);
         solve_all(
             &reference,
             dictionary,
@@ -264,10 +252,8 @@ fn all_bounces_error(folder: &Path, dictionary: &Dictionary, albedo: f64) -> f64
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn all_bounces_in_white_levels_are_within_the_bounds() {
-    let Some(folder) = oracle_folder_or_report("all bounces in white levels") else {
-        return;
-    };
     for (name, albedo, bound) in [
         ("standard", 0.5, 0.02),
         ("standard", 0.8, 0.02),
@@ -277,14 +263,14 @@ fn all_bounces_in_white_levels_are_within_the_bounds() {
         // mean over all seven files is 1.15 %; these six alone read 1.205 %.
         ("quality", 0.8, 0.0123),
     ] {
-        let error = all_bounces_error(&folder, preset(name), albedo);
+        let error = all_bounces_error(preset(name), albedo);
         assert!(error <= bound, "{name}, albedo {albedo}: {error}");
     }
 }
 
 /// Mean over a coloured file's lights.
-fn coloured_error(folder: &Path, name: &str, dictionary: &Dictionary, bounces: Bounces) -> f64 {
-    let reference = reference(folder, name);
+fn coloured_error(name: &str, dictionary: &Dictionary, bounces: Bounces) -> f64 {
+    let reference = reference(name);
     let pairs = solve_all(&reference, dictionary, Coupling::Table, bounces, 1.0);
     mean(pairs.iter().map(Pair::error))
 }
@@ -292,13 +278,11 @@ fn coloured_error(folder: &Path, name: &str, dictionary: &Dictionary, bounces: B
 const COLOURED: [&str; 3] = ["cube_one_white", "cube_cornell", "corridor5_painted"];
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn coloured_walls_are_within_the_bounds() {
-    let Some(folder) = oracle_folder_or_report("coloured walls") else {
-        return;
-    };
     for (name, bounds) in [("standard", [0.06, 0.04]), ("quality", [0.03, 0.02])] {
         for (bounces, bound) in [Bounces::First, Bounces::All].into_iter().zip(bounds) {
-            let errors = COLOURED.map(|file| coloured_error(&folder, file, preset(name), bounces));
+            let errors = COLOURED.map(|file| coloured_error(file, preset(name), bounces));
             let error = mean(errors);
             println!("coloured, {name}, {bounces:?}: {error:.4} of {errors:.4?}");
             assert!(error <= bound, "{name}, {bounces:?}: {error} of {errors:?}");
@@ -307,11 +291,9 @@ fn coloured_walls_are_within_the_bounds() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn a_white_wall_among_dark_ones_keeps_its_brightness() {
-    let Some(folder) = oracle_folder_or_report("brightness of a single white wall") else {
-        return;
-    };
-    let reference = reference(&folder, "cube_one_white");
+    let reference = reference("cube_one_white");
     let Kind::IrradianceRgb { albedo } = &reference.kind else {
         panic!("cube_one_white has colours");
     };
@@ -373,11 +355,9 @@ fn unenriched_error(reference: &ReferenceFile, modes: usize) -> f64 {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn plain_modes_of_a_closed_cube_are_as_good_as_the_prototype_s() {
-    let Some(folder) = oracle_folder_or_report("modes without enrichment") else {
-        return;
-    };
-    let cube = reference(&folder, "cube");
+    let cube = reference("cube");
     for (modes, bound) in [(32, 0.031), (64, 0.010)] {
         let error = unenriched_error(&cube, modes);
         println!("{modes} plain modes: {error:.4}");
@@ -386,11 +366,9 @@ fn plain_modes_of_a_closed_cube_are_as_good_as_the_prototype_s() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn a_stack_of_blocks_is_refused_by_name() {
-    let Some(folder) = oracle_folder_or_report("refusal of stacked blocks") else {
-        return;
-    };
-    let stack = reference(&folder, "stack3");
+    let stack = reference("stack3");
     let error = Scene::assemble(
         &level(&stack, 1.0),
         default_dictionary(),

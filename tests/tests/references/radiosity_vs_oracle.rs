@@ -9,13 +9,12 @@
 use glam::DVec3;
 use mrt_core::reference::bounces::Bounces;
 use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
-use mrt_core::reference::oracle_file::{
-    Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read,
-};
+use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
 use mrt_core::reference::radiosity::ExactScene;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
 use mrt_core::reference::radiosity::solve::{solve, solve_rgb};
 use mrt_core::reference::radiosity::transport::Transport;
+use mrt_tests::reference;
 
 /// Whole level, mean over lights: found 0.12 to 0.26 %, of it 0.1 the file's noise.
 const FIRST_BOUNCE_LIMIT: f64 = 0.003;
@@ -34,20 +33,19 @@ struct Level {
     transport: Transport,
 }
 
-fn load(name: &str) -> Option<Level> {
-    let folder = oracle_folder_or_report(&format!("exact_vs_oracle on {name}"))?;
-    let file = read(&folder.join(format!("{name}.json"))).unwrap();
+fn load(name: &str) -> Level {
+    let file = reference(name);
     let scene = ExactScene::from_cells(&file.cells, file.resolution.unwrap()).unwrap();
     let walls: Vec<_> = scene.walls().iter().map(|w| (w.block, w.face)).collect();
     assert_eq!(walls, file.walls, "texel order");
     let transport = Transport::build(&scene);
     // The largest must leave room for several at once.
     assert!(transport.bytes() < 300_000_000);
-    Some(Level {
+    Level {
         file,
         scene,
         transport,
-    })
+    }
 }
 
 /// Sums over 4 x 4 texels of walls of `resolution`² values.
@@ -104,9 +102,7 @@ fn is_stable(scene: &ExactScene, light: &PointLight) -> Vec<bool> {
 }
 
 fn check_colourless(name: &str) {
-    let Some(level) = load(name) else {
-        return;
-    };
+    let level = load(name);
     let Level {
         file,
         scene,
@@ -162,9 +158,7 @@ fn check_colourless(name: &str) {
 }
 
 fn check_coloured(name: &str) {
-    let Some(level) = load(name) else {
-        return;
-    };
+    let level = load(name);
     let Level {
         file,
         scene,
@@ -212,6 +206,7 @@ fn check_coloured(name: &str) {
 macro_rules! one_test_a_file {
     ($check:ident: $($name:ident),*) => {$(
         #[test]
+        #[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
         fn $name() {
             $check(stringify!($name));
         }
@@ -222,12 +217,10 @@ one_test_a_file!(check_colourless: cube, corridor5, l_turn, t_junction, room3x3,
 one_test_a_file!(check_coloured: cube_cornell, cube_one_white, corridor5_painted);
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn probe_files_are_read() {
-    let Some(folder) = oracle_folder_or_report("probe_files_are_read") else {
-        return;
-    };
     for (name, points) in [("cube_probes", 64), ("corridor5_probes", 320)] {
-        let file = read(&folder.join(format!("{name}.json"))).unwrap();
+        let file = reference(name);
         assert_eq!(file.shape[2..], [points, 9]);
         assert_eq!(file.term(1, 0).unwrap().len(), points * 9);
         assert!(file.indirect_irradiance(0, Bounces::First, 1.0).is_err());

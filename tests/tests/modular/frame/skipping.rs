@@ -373,7 +373,7 @@ fn light_that_hardly_changes_is_kept() {
         let mut exact = Frame::new(
             &scene,
             FrameConfig {
-                outputs: outputs,
+                outputs,
                 ..FrameConfig::default()
             },
         );
