@@ -251,6 +251,8 @@ impl Frame {
             if old.has_indirect {
                 next.schedule.state[rank.get()].has_indirect = true;
                 next.schedule.touch(rank, f32::INFINITY);
+                // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their turn.
+                next.schedule.mark_changed(rank);
             }
         }
         *self = next;
