@@ -175,7 +175,7 @@ pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
 
 /// How a frame stands to the one of [`frame_of_heading`] with the same heading: `frame = reference after
 /// exchange after mirrors`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Roll {
     /// True when x and y are exchanged.
     pub exchanged: bool,

@@ -26,8 +26,15 @@ pub(super) struct Table<'a, M> {
     cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
 }
 
-/// Shape, opening, word, and the frame's roll.
-type CacheKey = (usize, usize, usize, bool, u8);
+/// What the responses of a path depend on.
+#[derive(PartialEq, Eq, Hash)]
+struct CacheKey {
+    shape: usize,
+    opening: usize,
+    /// Position of the path's word in the table.
+    word: usize,
+    roll: Roll,
+}
 
 /// A path up to the block that it has just entered.
 #[derive(Clone)]
@@ -252,7 +259,12 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     ) -> Rc<Matrix<f32>> {
         let shape = self.context.scene.blocks[source.get()].shape_index;
         let roll = Roll::of(frame);
-        let key = (shape, opening, word, roll.exchanged, roll.mirrors);
+        let key = CacheKey {
+            shape,
+            opening,
+            word,
+            roll,
+        };
         let paths = &self.context.dictionary.paths;
         let used = self.context.used_shapes[shape];
         self.cache
