@@ -8,7 +8,8 @@ pub trait Executor: Debug + Send + Sync {
     /// About how many tasks run in parallel.
     fn workers(&self) -> usize;
 
-    /// Calls `task` once with each number below `tasks`, on any threads in any order, and returns when all calls have returned.
+    /// Calls `task` once with each number below `tasks`, on any threads in any order, and returns when all calls have
+    /// returned.
     fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync));
 }
 

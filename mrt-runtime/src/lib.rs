@@ -1,9 +1,10 @@
 //! Dynamic indirect light for games: Modular Radiance Transfer at run time (Loos et al., "Modular Radiance Transfer",
 //! SIGGRAPH Asia 2011).
 //!
-//! A [`Dictionary`] holds the light transport of a few canonical shapes, computed once. A [`Level`] places warped copies of these shapes
-//! and joins their openings. A [`Scene`] is assembled from both; it never changes and is cheap to share between threads. A [`Frame`]
-//! keeps a scene, takes [`Light`]s, and computes a [`Lightmap`] and the light at any point.
+//! A [`Dictionary`] holds the light transport of a few canonical shapes, computed once. A [`Level`] places warped
+//! copies of these shapes and joins their openings. A [`Scene`] is assembled from both; it never changes and is cheap
+//! to share between threads. A [`Frame`] keeps a scene, takes [`Light`]s, and computes a [`Lightmap`] and the light at
+//! any point.
 //!
 //! ```
 //! use mrt_runtime::glam::{Vec3, vec3};
@@ -31,7 +32,8 @@
 //! Positions are in metres, axes right-handed with +Y up, colours linear RGB, irradiance in W/m², intensities in W/sr.
 //!
 //! Features: `text` (default) reads and writes levels as TOML; `timing` measures the stages of a frame; `rayon` adds an
-//! [`Executor`](executor::Executor) that uses rayon's threads; `generator` makes mazes. Without features, the frame alone remains.
+//! [`Executor`](executor::Executor) that uses rayon's threads; `generator` makes mazes. Without features, the frame
+//! alone remains.
 
 mod level;
 mod light;

@@ -1,5 +1,5 @@
-//! The parts behind the names at the root, for tools and bakes. They follow the needs of this workspace: any release may change, move
-//! or remove any of them.
+//! The parts behind the names at the root, for tools and bakes. They follow the needs of this workspace: any release
+//! may change, move or remove any of them.
 
 /// Shapes, blocks, the checks of a level, and levels ready to be lit.
 pub mod level {

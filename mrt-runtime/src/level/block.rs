@@ -14,8 +14,8 @@ pub const MAX_BLOCKS: usize = 100_000;
 pub struct Level {
     /// Blocks; results come in this order.
     pub blocks: Vec<Block>,
-    /// Pairs of openings that lead into one another. An opening without a connection leads outside: light leaves through
-    /// it, and directional lights shine in.
+    /// Pairs of openings that lead into one another. An opening without a connection leads outside: light leaves
+    /// through it, and directional lights shine in.
     pub connections: Vec<Connection>,
     /// Connections that can be closed while the game runs; frames name a door by its position in this list.
     pub doors: Vec<Door>,

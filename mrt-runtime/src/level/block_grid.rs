@@ -9,8 +9,8 @@ const CELLS_PER_BLOCK: f64 = 2.0;
 /// Most cells along an axis.
 const MAX_CELLS_PER_AXIS: f64 = 1024.0;
 
-/// Most entries in a grid's lists for each block. Unit cells in rows reach into 27 cells each; in a level with many large
-/// blocks among small ones, the grid gets coarser until its lists are this short.
+/// Most entries in a grid's lists for each block. Unit cells in rows reach into 27 cells each; in a level with many
+/// large blocks among small ones, the grid gets coarser until its lists are this short.
 const ENTRIES_PER_BLOCK: usize = 64;
 
 /// For each cell of a uniform grid, the blocks whose bounds reach into it.
@@ -25,8 +25,8 @@ pub(crate) struct BlockGrid {
 }
 
 impl BlockGrid {
-    /// A grid over the bounds (smallest, largest) of each block, metres, in the order of the blocks. A point that is outside
-    /// some bounds by at most `slack` of their diagonal counts as inside.
+    /// A grid over the bounds (smallest, largest) of each block, metres, in the order of the blocks. A point that is
+    /// outside some bounds by at most `slack` of their diagonal counts as inside.
     pub(crate) fn new(bounds: &[(DVec3, DVec3)], slack: f64) -> Self {
         let widened: Vec<(DVec3, DVec3)> = bounds
             .iter()
@@ -110,8 +110,8 @@ impl BlockGrid {
         &self.blocks[self.first[cell] as usize..self.first[cell + 1] as usize]
     }
 
-    /// The cell that contains a point, or the nearest cell to a point outside the grid. It never decreases where a coordinate
-    /// increases, whatever the rounding: a point within bounds is in a cell that lists their block.
+    /// The cell that contains a point, or the nearest cell to a point outside the grid. It never decreases where a
+    /// coordinate increases, whatever the rounding: a point within bounds is in a cell that lists their block.
     fn cell_of(&self, point: DVec3) -> UVec3 {
         let place = (point - self.low) * self.cells_per_metre;
         let last = (self.cells - 1).as_dvec3();
@@ -124,8 +124,8 @@ impl BlockGrid {
     }
 }
 
-/// Number of cells along each axis: cells about as large as the mean block, and about [`CELLS_PER_BLOCK`] times as many as
-/// blocks at most.
+/// Number of cells along each axis: cells about as large as the mean block, and about [`CELLS_PER_BLOCK`] times as many
+/// as blocks at most.
 fn cells_along_axes(bounds: &[(DVec3, DVec3)], size: DVec3) -> UVec3 {
     let count = bounds.len().max(1) as f64;
     let sum: DVec3 = bounds.iter().map(|(low, high)| *high - *low).sum();

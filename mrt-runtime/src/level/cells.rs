@@ -15,8 +15,8 @@ impl Level {
         Self::from_joined_cells(cells, albedo, |_, _| true)
     }
 
-    /// Same as [`Level::from_cells`], but neighbouring cells have a wall between them where `is_joined` is false. It gets the
-    /// positions of both cells, and must return the same for both orders.
+    /// Same as [`Level::from_cells`], but neighbouring cells have a wall between them where `is_joined` is false. It
+    /// gets the positions of both cells, and must return the same for both orders.
     ///
     /// # Errors
     /// [`CellsError`], when a cell is given twice or no shape has its openings.
@@ -101,7 +101,8 @@ pub enum CellsError {
     },
 }
 
-/// The shape and the rotation that leave exactly the faces `open` without a wall; a rotation about +Y where one suffices.
+/// The shape and the rotation that leave exactly the faces `open` without a wall; a rotation about +Y where one
+/// suffices.
 pub fn shape_with_openings(open: &[Face]) -> Option<(&'static Shape, CubeRotation)> {
     let upright = (0..4).map(CubeRotation::about_y);
     upright.chain(CubeRotation::all()).find_map(|rotation| {

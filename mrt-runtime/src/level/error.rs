@@ -8,8 +8,8 @@ use mrt_core::geometry::hexahedron::HexahedronError;
 /// Corners of joined faces may be this far apart, as a fraction of the smaller block's diagonal.
 pub const JOIN_TOLERANCE: f64 = 1e-3;
 
-/// Largest coordinate of a block, in diagonals of that block. Texel positions in `f32` are then good to a thousandth of the
-/// diagonal, a fortieth of a texel at 16² texels a wall.
+/// Largest coordinate of a block, in diagonals of that block. Texel positions in `f32` are then good to a thousandth of
+/// the diagonal, a fortieth of a texel at 16² texels a wall.
 pub const FAR_LIMIT: f64 = 1e4;
 
 /// Two blocks may enter each other by this fraction of the smaller one's diagonal before they count as overlapping.

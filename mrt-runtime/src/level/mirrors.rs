@@ -6,8 +6,8 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::texel_permutation;
 
-/// True if `map` takes every opening to an opening of the same outline. Doors and windows have an upper and a lower edge, so
-/// +y must stay +y for them.
+/// True if `map` takes every opening to an opening of the same outline. Doors and windows have an upper and a lower
+/// edge, so +y must stay +y for them.
 fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
     shape.openings.iter().all(|opening| {
         let same = shape
@@ -18,8 +18,8 @@ fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
     })
 }
 
-/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of two axes
-/// without an axis mirror.
+/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of two
+/// axes without an axis mirror.
 pub fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
     let axes: Vec<usize> = (0..3)
         .filter(|&axis| keeps(CubeSymmetry::mirror(axis), shape))

@@ -8,8 +8,8 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Checks that no two blocks of the level enter each other deeper than [`OVERLAP_TOLERANCE`].
 ///
-/// Each block is replaced by the convex hull of its corners, which contains the warped block. A sweep along x finds the pairs
-/// to test, so the cost is near-linear unless many blocks share a range of x.
+/// Each block is replaced by the convex hull of its corners, which contains the warped block. A sweep along x finds the
+/// pairs to test, so the cost is near-linear unless many blocks share a range of x.
 pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     let bounds: Vec<_> = level.blocks.iter().map(|b| b.warp.bounds()).collect();
     let mut order: Vec<usize> = (0..bounds.len()).collect();
@@ -50,8 +50,8 @@ pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     Ok(())
 }
 
-/// Most pairs of blocks with overlapping bounds that are tested, for each block of the level. Blocks of real levels have a
-/// dozen neighbours.
+/// Most pairs of blocks with overlapping bounds that are tested, for each block of the level. Blocks of real levels
+/// have a dozen neighbours.
 pub(crate) const MAX_TESTS_PER_BLOCK: usize = 256;
 
 /// How far the faces of a block are from planar, metres: the largest distance between the two diagonals of a face.
@@ -68,8 +68,8 @@ fn bend(block: &Hexahedron) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Depth, metres, by which two hulls enter each other: the smallest overlap of their shadows over all candidate axes, negative
-/// when an axis separates them. The search ends at the first overlap of at most `enough`.
+/// Depth, metres, by which two hulls enter each other: the smallest overlap of their shadows over all candidate axes,
+/// negative when an axis separates them. The search ends at the first overlap of at most `enough`.
 fn penetration(a: &Hexahedron, b: &Hexahedron, enough: f64) -> f64 {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let normals = [a, b].into_iter().flat_map(|block| {
@@ -103,8 +103,8 @@ fn shadow_overlap(a: &Hexahedron, b: &Hexahedron, axis: DVec3) -> f64 {
     (a_max - b_min).min(b_max - a_min)
 }
 
-/// Normals, not of unit length, of the triangles that a face may have in the hull: where it is bent, either diagonal may be a
-/// ridge.
+/// Normals, not of unit length, of the triangles that a face may have in the hull: where it is bent, either diagonal
+/// may be a ridge.
 fn triangle_normals(quad: &[DVec3; 4]) -> [DVec3; 4] {
     std::array::from_fn(|k| {
         let [p, q, r] = [quad[k], quad[(k + 1) % 4], quad[(k + 2) % 4]];
@@ -112,8 +112,8 @@ fn triangle_normals(quad: &[DVec3; 4]) -> [DVec3; 4] {
     })
 }
 
-/// Directions of all possible edges of the hull: the edges of the cube, and both diagonals of each face, since a bent face may
-/// have a ridge along either.
+/// Directions of all possible edges of the hull: the edges of the cube, and both diagonals of each face, since a bent
+/// face may have a ridge along either.
 fn edges(block: &Hexahedron) -> Vec<DVec3> {
     let mut edges = Vec::with_capacity(24);
     for k in 0..8usize {

@@ -59,7 +59,8 @@ pub struct PlacedBlock {
 pub struct Portal {
     /// The canonical face.
     pub face: Face,
-    /// Corners, metres, in a loop that runs clockwise seen from inside the block: four, or 32 of a polygon around a disc.
+    /// Corners, metres, in a loop that runs clockwise seen from inside the block: four, or 32 of a polygon around a
+    /// disc.
     pub corners: Vec<DVec3>,
     /// Normal out of the block at the first corner, not of unit length.
     pub outward: DVec3,
@@ -125,7 +126,8 @@ impl PlacedBlock {
             && self.is_inside_walls(point, slack)
     }
 
-    /// False if the block is a tube and a point of its cube is outside the round wall by more than `tolerance` block widths.
+    /// False if the block is a tube and a point of its cube is outside the round wall by more than `tolerance` block
+    /// widths.
     fn is_inside_walls(&self, point: DVec3, tolerance: f64) -> bool {
         self.shape.tube().is_none()
             || self
@@ -145,7 +147,8 @@ impl PlacedLevel {
         self.blocks.get(index.get())
     }
 
-    /// The first block that contains a point, metres; if none does, the first that contains it within [`BLOCK_TOLERANCE`].
+    /// The first block that contains a point, metres; if none does, the first that contains it within
+    /// [`BLOCK_TOLERANCE`].
     ///
     /// Cost: a test of each of the few blocks near the point, however many the level has.
     pub fn block_at(&self, point: DVec3) -> Option<BlockIndex> {
@@ -166,9 +169,9 @@ impl PlacedLevel {
         self.grid.near(point).iter().copied().find(is_around)
     }
 
-    /// Index within a block of the texel at (row, column) of a face *as the level names it*, after orientation. For a tube, row
-    /// and column count on the flat face that names the chart. `None` for openings, and for blocks and texels that do not
-    /// exist.
+    /// Index within a block of the texel at (row, column) of a face *as the level names it*, after orientation. For a
+    /// tube, row and column count on the flat face that names the chart. `None` for openings, and for blocks and texels
+    /// that do not exist.
     pub fn level_texel(
         &self,
         block: BlockIndex,

@@ -45,17 +45,17 @@ pub enum Outline {
     Whole,
     /// A hole in a wall.
     Hole(Hole),
-    /// The round end of a tube, of radius [`TUBE_RADIUS`] about the middle of the face. The rest of the face is neither wall nor
-    /// opening.
+    /// The round end of a tube, of radius [`TUBE_RADIUS`] about the middle of the face. The rest of the face is neither
+    /// wall nor opening.
     Disc,
 }
 
-/// Number of corners of the polygon that stands for a disc. The polygon contains the disc, so that light which grazes the wall
-/// on both sides of an opening passes; at its corners it is 0.002 block widths too wide.
+/// Number of corners of the polygon that stands for a disc. The polygon contains the disc, so that light which grazes
+/// the wall on both sides of an opening passes; at its corners it is 0.002 block widths too wide.
 const DISC_CORNERS: usize = 32;
 
-/// A rectangle in a wall, in the face's (u, v). It is symmetric in u, so that the two faces that meet there have the same
-/// rectangle.
+/// A rectangle in a wall, in the face's (u, v). It is symmetric in u, so that the two faces that meet there have the
+/// same rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hole {
     /// 0.4 wide, from the floor to 0.7 above it.
@@ -164,8 +164,9 @@ const fn tube(name: &'static str, form: TubeForm, openings: &'static [Aperture])
     }
 }
 
-/// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six have missing faces at the sides only), rooms
-/// with a door or a window, and tubes. Bends to the left, to the right, up and down are orientations of the one `bend`.
+/// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six have missing faces at the sides
+/// only), rooms with a door or a window, and tubes. Bends to the left, to the right, up and down are orientations of
+/// the one `bend`.
 pub static SHAPES: [Shape; 16] = [
     shape("closed", &[]),
     shape("dead_end", &[POS_X]),
@@ -289,8 +290,8 @@ impl Shape {
         Some(position * resolution * resolution)
     }
 
-    /// The wall of each texel and the texel's centre in the unit cube, in storage order: wall by wall, row (v) by row, column
-    /// (u) by column.
+    /// The wall of each texel and the texel's centre in the unit cube, in storage order: wall by wall, row (v) by row,
+    /// column (u) by column.
     pub fn texels(&self, resolution: usize) -> impl Iterator<Item = (Face, DVec3)> + '_ {
         let tube = self.tube();
         self.walls().flat_map(move |face| {

@@ -11,8 +11,8 @@ pub struct UnitFromWorld {
     affine: Option<(DMat3, DVec3)>,
 }
 
-/// Distance, in diagonals of the block, within which the corners of a warp count as those of an affine map: a hundred roundings
-/// of coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT).
+/// Distance, in diagonals of the block, within which the corners of a warp count as those of an affine map: a hundred
+/// roundings of coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT).
 const AFFINE_TOLERANCE: f64 = 1e-10;
 
 impl UnitFromWorld {
@@ -30,8 +30,8 @@ impl UnitFromWorld {
         }
     }
 
-    /// The point of the unit cube, or outside it, that the warp takes to `world`, metres. Where Newton's method does not find
-    /// one, far from a warped block, the middle of the cube.
+    /// The point of the unit cube, or outside it, that the warp takes to `world`, metres. Where Newton's method does
+    /// not find one, far from a warped block, the middle of the cube.
     pub fn point(&self, world: DVec3) -> DVec3 {
         match self.affine {
             Some((inverse, origin)) => inverse * (world - origin),

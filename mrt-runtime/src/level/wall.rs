@@ -6,7 +6,8 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 
 impl Shape {
-    /// The point at (u, v) in [0, 1]² of a wall. For a tube, v may be outside [0, 1]: the chart continues around the tube.
+    /// The point at (u, v) in [0, 1]² of a wall. For a tube, v may be outside [0, 1]: the chart continues around the
+    /// tube.
     pub fn wall_point(&self, wall: Face, u: f64, v: f64) -> WallPoint {
         match self.tube() {
             None => WallPoint {
@@ -41,8 +42,8 @@ impl Shape {
             .collect()
     }
 
-    /// True when a point of the unit cube is inside the walls; points outside a round wall by at most `tolerance` block widths
-    /// count as inside.
+    /// True when a point of the unit cube is inside the walls; points outside a round wall by at most `tolerance` block
+    /// widths count as inside.
     pub fn is_inside_walls(&self, unit: DVec3, tolerance: f64) -> bool {
         self.tube()
             .is_none_or(|form| form.wall_distance(unit) >= -tolerance)

@@ -7,16 +7,16 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 /// The eight corners of a form, in the order of [`Hexahedron`]; see [`form_of`].
 pub type WarpForm = [[f32; 3]; 8];
 
-/// Two forms are the same if their coordinates differ by less than this, in diagonals of the block. Levels give corners as
-/// decimal numbers, perhaps far from the origin, which are good to 1e-6 of a block; a texel at 16² is forty times as wide as
-/// this tolerance.
+/// Two forms are the same if their coordinates differ by less than this, in diagonals of the block. Levels give corners
+/// as decimal numbers, perhaps far from the origin, which are good to 1e-6 of a block; a texel at 16² is forty times as
+/// wide as this tolerance.
 pub const FORM_TOLERANCE: f32 = 1e-3;
 
-/// The form of a block. Its corners are the images of the canonical cube's corners, turned back by the block's orientation,
-/// minus the first of them, divided by the length of the diagonal of their bounds.
+/// The form of a block. Its corners are the images of the canonical cube's corners, turned back by the block's
+/// orientation, minus the first of them, divided by the length of the diagonal of their bounds.
 ///
-/// A cube has the same form in all of its 24 orientations, and so has every other box. A block at another angle to the level's
-/// axes has another form, since its probes have those axes.
+/// A cube has the same form in all of its 24 orientations, and so has every other box. A block at another angle to the
+/// level's axes has another form, since its probes have those axes.
 pub fn form_of(block: &Block) -> WarpForm {
     let warp = block.canonical_warp();
     let back = block.orientation.inverse();

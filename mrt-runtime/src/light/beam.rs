@@ -1,9 +1,10 @@
 //! Where a light's direct light goes: beams through the level's openings, followed outwards from the light.
 //!
-//! A beam is a light seen through one sequence of openings. An opening lets a cone of light through, whose sides are the planes
-//! of the light and the opening's edges. A sequence of openings lets the intersection of their cones through: Luebke and
-//! Georges, "Portals and mirrors", I3D 1995, with exact polygons in place of their rectangles. The sign conditions are those
-//! of [`Openings`](crate::light::visibility::Openings), which tests the same from the receiver's end.
+//! A beam is a light seen through one sequence of openings. An opening lets a cone of light through, whose sides are
+//! the planes of the light and the opening's edges. A sequence of openings lets the intersection of their cones
+//! through: Luebke and Georges, "Portals and mirrors", I3D 1995, with exact polygons in place of their rectangles. The
+//! sign conditions are those of [`Openings`](crate::light::visibility::Openings), which tests the same from the
+//! receiver's end.
 //!
 //! The cones of different sequences do not overlap, so a block's direct light is the sum over its beams.
 
@@ -18,8 +19,8 @@ use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::TubeForm;
 
-/// Most beams that wait to be followed further. One waits for each opening beside the path of the beam that is followed: a
-/// straight corridor of any length needs one, an open hall of 300 x 300 blocks a few hundred.
+/// Most beams that wait to be followed further. One waits for each opening beside the path of the beam that is
+/// followed: a straight corridor of any length needs one, an open hall of 300 x 300 blocks a few hundred.
 const MAX_PENDING: usize = 1024;
 
 /// A light's direct light in a block, through one sequence of openings.
@@ -31,22 +32,23 @@ pub struct Beam {
     pub light: u32,
     /// Fraction of light, in (0, 1], that the doors on the way let through: the product of their values.
     pub fraction: f32,
-    /// Origin of the planes, metres: the light, or a corner of the block for directional lights. Far from the world's origin,
-    /// differences from it keep more digits than positions do.
+    /// Origin of the planes, metres: the light, or a corner of the block for directional lights. Far from the world's
+    /// origin, differences from it keep more digits than positions do.
     pub origin: Vec3,
     /// Only the first `plane_count` entries are valid.
     planes: [[f32; 4]; MAX_PLANES],
     plane_count: u32,
-    /// True if the planes do not tell which points are lit, because of a bend or too many planes on the way. All of the light's
-    /// beams in this block are then replaced by [`add_exact`](crate::light::direct_light::add_exact).
+    /// True if the planes do not tell which points are lit, because of a bend or too many planes on the way. All of the
+    /// light's beams in this block are then replaced by [`add_exact`](crate::light::direct_light::add_exact).
     pub exact: bool,
 }
 
 impl Beam {
-    /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for all planes.
-    /// Planes that the whole block is inside of are left out.
+    /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for all
+    /// planes. Planes that the whole block is inside of are left out.
     ///
-    /// Evaluated in `f32` with w added last, a point in the plane where two beams of a light meet is in exactly one of them.
+    /// Evaluated in `f32` with w added last, a point in the plane where two beams of a light meet is in exactly one of
+    /// them.
     pub fn planes(&self) -> &[[f32; 4]] {
         &self.planes[..self.plane_count as usize]
     }
@@ -126,8 +128,8 @@ impl Trace<'_> {
 }
 
 impl BeamTracer {
-    /// Finds the level's openings to the outside, and allocates the memory of tracing: 0.6 kB for each of up to 1024 beams,
-    /// fewer in small scenes.
+    /// Finds the level's openings to the outside, and allocates the memory of tracing: 0.6 kB for each of up to 1024
+    /// beams, fewer in small scenes.
     pub fn new(level: &PlacedLevel) -> Self {
         let openings = level.blocks.iter().map(|block| block.portals.len()).sum();
         let mut tracer = Self {
@@ -168,14 +170,16 @@ impl BeamTracer {
 
     /// Calls `emit` for each beam of a light; beams name it by the index `light`.
     ///
-    /// Each block gets at most one [exact](Beam::exact) beam. It may come after other beams of its block, which it replaces; no
-    /// beam of the block comes after it. A light without intensity has no beams, and closed doors let no beam through.
+    /// Each block gets at most one [exact](Beam::exact) beam. It may come after other beams of its block, which it
+    /// replaces; no beam of the block comes after it. A light without intensity has no beams, and closed doors let no
+    /// beam through.
     ///
-    /// Cost: half a microsecond for each block that a beam enters; for a directional light, also a test of each opening to the
-    /// outside.
+    /// Cost: half a microsecond for each block that a beam enters; for a directional light, also a test of each opening
+    /// to the outside.
     ///
     /// # Panics
-    /// If the level has another number of blocks than the tracer's, or `doors` has another length than the level's doors.
+    /// If the level has another number of blocks than the tracer's, or `doors` has another length than the level's
+    /// doors.
     pub fn trace(
         &mut self,
         level: &PlacedLevel,
@@ -323,7 +327,8 @@ impl BeamTracer {
             self.pending.push(self.next.clone());
             self.waiting += 1;
         } else {
-            // There is no room to find the other beams. Exact beams let the receivers of every block test their light themselves.
+            // There is no room to find the other beams. Exact beams let the receivers of every block test their light
+            // themselves.
             self.waiting = 0;
             for block in 0..trace.level.blocks.len() {
                 self.beam.block = BlockIndex::new(block);
@@ -346,8 +351,8 @@ impl BeamTracer {
     }
 }
 
-/// Sets all of `beam` but its light: the light of `node` in a block, without the planes that the whole block is inside of.
-/// False if the block is outside a plane.
+/// Sets all of `beam` but its light: the light of `node` in a block, without the planes that the whole block is inside
+/// of. False if the block is outside a plane.
 ///
 /// Only the corners of the block are tested: a warped block is in the hull of its corners, and a tube is in its cube.
 fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -> bool {
@@ -374,8 +379,8 @@ fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -
         if smallest < -slack {
             let n = plane.normal.as_vec3();
             let mut w = plane.at(shift) as f32;
-            // Two beams that meet have the same plane with opposite signs, to the bit. Rounding one of them down leaves each
-            // texel in the plane to exactly one beam.
+            // Two beams that meet have the same plane with opposite signs, to the bit. Rounding one of them down leaves
+            // each texel in the plane to exactly one beam.
             if n.to_array().into_iter().find(|&x| x != 0.0) < Some(0.0) {
                 w = w.next_down();
             }

@@ -95,7 +95,8 @@ fn unshadowed_irradiance(
 /// Adds the irradiance of one light in a block, with a test of shadow for each texel. For blocks with an
 /// [exact](crate::light::beam::Beam::exact) beam.
 ///
-/// `out` has red, green and blue, one value for each slot, as long as the slices of `texels`. Cost: up to microseconds a texel.
+/// `out` has red, green and blue, one value for each slot, as long as the slices of `texels`. Cost: up to microseconds
+/// a texel.
 ///
 /// # Panics
 /// If the slices differ in length.

@@ -54,8 +54,8 @@ impl Light {
         }
     }
 
-    /// A sphere that shines along `direction`. `cone` has the inner and the outer angle, radians. See [`Light::Spot`] for the
-    /// meaning and units of all values.
+    /// A sphere that shines along `direction`. `cone` has the inner and the outer angle, radians. See [`Light::Spot`]
+    /// for the meaning and units of all values.
     pub const fn spot(
         position: Vec3,
         radius: f32,

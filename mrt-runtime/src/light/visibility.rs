@@ -30,8 +30,8 @@ pub enum Toward {
 
 /// Decides which part of a light reaches a point.
 pub trait Visibility: Sync {
-    /// Fraction in [0, 1] of the light that arrives. Larger values count as 1, negative ones and NaN as 0. `doors` has the present
-    /// value of each of [`PlacedLevel::doors`].
+    /// Fraction in [0, 1] of the light that arrives. Larger values count as 1, negative ones and NaN as 0. `doors` has
+    /// the present value of each of [`PlacedLevel::doors`].
     fn fraction(
         &self,
         level: &PlacedLevel,
@@ -40,8 +40,8 @@ pub trait Visibility: Sync {
         toward: Toward,
     ) -> f32;
 
-    /// A version of the answers: change it whenever they may differ from earlier ones. While it stays the same, frames keep direct
-    /// light that nothing else changed. With `None`, the default, every frame asks again for every block.
+    /// A version of the answers: change it whenever they may differ from earlier ones. While it stays the same, frames
+    /// keep direct light that nothing else changed. With `None`, the default, every frame asks again for every block.
     fn version(&self) -> Option<u64> {
         None
     }
@@ -79,9 +79,9 @@ impl Visibility for Openings {
 
 /// The caller's function decides where light passes, such as a ray cast into the real mesh.
 ///
-/// The function gets the positions of the receiver and the light, metres, and returns the fraction in [0, 1] that arrives. A
-/// light at infinity is put [`RAY_REACH`] away from the receiver. Openings and doors play no part: only the function keeps light
-/// from crossing the walls of blocks.
+/// The function gets the positions of the receiver and the light, metres, and returns the fraction in [0, 1] that
+/// arrives. A light at infinity is put [`RAY_REACH`] away from the receiver. Openings and doors play no part: only the
+/// function keeps light from crossing the walls of blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<F>(pub F);
 
@@ -98,8 +98,9 @@ impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
     }
 }
 
-/// A [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that changes now and then. With
-/// [`FrameConfig::slice`](crate::modular::frame::config::FrameConfig), the rays after a change are spread over several frames.
+/// A [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that changes now and
+/// then. With [`FrameConfig::slice`](crate::modular::frame::config::FrameConfig), the rays after a change are spread
+/// over several frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Versioned<V> {
     /// Decides which part of a light reaches a point.
@@ -124,13 +125,14 @@ impl<V: Visibility> Visibility for Versioned<V> {
     }
 }
 
-/// Follows the segment from the receiver to the light through connected openings, into the light's block, or to the outside for a
-/// light at infinity. Returns the product of the values of the doors on the way, or 0 if a wall is in the way.
+/// Follows the segment from the receiver to the light through connected openings, into the light's block, or to the
+/// outside for a light at infinity. Returns the product of the values of the doors on the way, or 0 if a wall is in the
+/// way.
 ///
-/// Cubes and straight tubes count as convex, so nothing inside them is in the way; they are convex unless faces are bent. In a
-/// bend, the part of the segment between its openings is tested in the canonical frame, where it is straight if the warp is
-/// affine; for other warps only its ends are exact. A line that leaves through an opening to the outside reaches lights at
-/// infinity, even if other blocks of the level stand further on.
+/// Cubes and straight tubes count as convex, so nothing inside them is in the way; they are convex unless faces are
+/// bent. In a bend, the part of the segment between its openings is tested in the canonical frame, where it is straight
+/// if the warp is affine; for other warps only its ends are exact. A line that leaves through an opening to the outside
+/// reaches lights at infinity, even if other blocks of the level stand further on.
 fn through_openings(level: &PlacedLevel, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
     let (direction, goal) = match toward {
         Toward::Point { position, block } => (position - receiver.position, Some(block)),
@@ -189,8 +191,8 @@ fn is_free_inside(block: &PlacedBlock, from: DVec3, to: DVec3) -> bool {
 
 /// True when the line from `origin` along `direction` passes the portal outwards.
 ///
-/// A line passes a loop of corners when it is on the same side of all edges. The test depends on the corners alone, so the blocks
-/// on both sides of an opening agree, even if it is bent.
+/// A line passes a loop of corners when it is on the same side of all edges. The test depends on the corners alone, so
+/// the blocks on both sides of an opening agree, even if it is bent.
 fn leaves_through(portal: &Portal, origin: DVec3, direction: DVec3) -> bool {
     if direction.dot(portal.outward) <= 0.0 {
         return false;

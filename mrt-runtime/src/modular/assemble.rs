@@ -21,16 +21,17 @@ const BYTES_PER_TEXEL: usize = 4 * 12 + 4 * 12 + 2 * 12;
 
 impl Scene {
     /// Checks the level, looks up its shapes and assembles `T_b->r`. From a
-    /// [`StoredDictionary`](crate::modular::dictionary::StoredDictionary), only the operators that the level uses are decoded. The scene
-    /// borrows neither the level nor the dictionary.
+    /// [`StoredDictionary`](crate::modular::dictionary::StoredDictionary), only the operators that the level uses are
+    /// decoded. The scene borrows neither the level nor the dictionary.
     ///
-    /// Cost: by the path table, a k_r x k_e x k_b product for each path of a shape's light, and the addition of one such matrix for each
-    /// path in the level; by lightfields, a k_rlf x k_rlf x k_b product for each opening crossed. A maze of 13 blocks takes 30 ms on one
-    /// core, a maze of 10,000 blocks 20 s: assemble large levels on a thread of their own.
+    /// Cost: by the path table, a k_r x k_e x k_b product for each path of a shape's light, and the addition of one
+    /// such matrix for each path in the level; by lightfields, a k_rlf x k_rlf x k_b product for each opening crossed.
+    /// A maze of 13 blocks takes 30 ms on one core, a maze of 10,000 blocks 20 s: assemble large levels on a thread of
+    /// their own.
     ///
     /// # Errors
-    /// [`AssembleError`], if the level is refused, the dictionary lacks an operator, a setting is out of range, or the scene would exceed
-    /// [`AssembleConfig::max_bytes`].
+    /// [`AssembleError`], if the level is refused, the dictionary lacks an operator, a setting is out of range, or the
+    /// scene would exceed [`AssembleConfig::max_bytes`].
     pub fn assemble(
         level: &Level,
         dictionary: &Dictionary<impl OperatorMatrix>,

@@ -1,7 +1,8 @@
 //! The dictionary: the operators of the canonical shapes.
 //!
-//! A bake makes matrices in `f32`. A game may leave them in the bytes of a mapped file, as they are stored ([`StoredDictionary`]).
-//! [`Scene::assemble`](crate::modular::scene::Scene::assemble) takes either, and decodes only what the level uses.
+//! A bake makes matrices in `f32`. A game may leave them in the bytes of a mapped file, as they are stored
+//! ([`StoredDictionary`]). [`Scene::assemble`](crate::modular::scene::Scene::assemble) takes either, and decodes only
+//! what the level uses.
 
 mod map;
 pub mod operator;
@@ -73,8 +74,8 @@ impl<M: OperatorMatrix> Dictionary<M> {
         self.map(|_, matrix| matrix.decode().into_owned())
     }
 
-    /// The same dictionary with every matrix stored as [`OperatorKind::storage`] of `storage`. Matrices that are stored so already keep
-    /// their bits.
+    /// The same dictionary with every matrix stored as [`OperatorKind::storage`] of `storage`. Matrices that are stored
+    /// so already keep their bits.
     pub fn stored_as(&self, storage: Storage) -> StoredDictionary<'_> {
         self.map(|kind, matrix| {
             let stored = matrix.as_stored(kind.modes());
@@ -108,7 +109,8 @@ impl<M> PathTable<M> {
         [self.depth, self.hole_depth, 0]
     }
 
-    /// Whether the baked table had a word. If it had, and [`PathTable::entries`] has not, packing has left the word out.
+    /// Whether the baked table had a word. If it had, and [`PathTable::entries`] has not, packing has left the word
+    /// out.
     pub fn whole_table_has(&self, word: &Word) -> bool {
         let mut holes = word.crossings().iter().filter(|c| c.hole.is_some());
         let length = word.crossings().len();

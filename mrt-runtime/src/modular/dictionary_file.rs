@@ -1,8 +1,9 @@
 //! Dictionaries as bytes, in the versioned container of the core.
 //!
-//! This is version 2, the version that is written. The values of a matrix are a section of F32, F16 or I8, column-major. A matrix of F16
-//! or I8 has a second section with its scales, one F32 for each mode (`OperatorKind::modes`). Its name is that of the values followed by
-//! `*`, so names of values are at most seven bytes long.
+//! This is version 2, the version that is written. The values of a matrix are a section of F32, F16 or I8,
+//! column-major. A matrix of F16 or I8 has a second section with its scales, one F32 for each mode
+//! (`OperatorKind::modes`). Its name is that of the values followed by `*`, so names of values are at most seven bytes
+//! long.
 //!
 //! | section | content |
 //! | --- | --- |
@@ -38,10 +39,11 @@ use crate::modular::dictionary_file::format::{FORMAT, Source};
 use mrt_core::container::{ByteBudget, Container};
 
 impl<'a> StoredDictionary<'a> {
-    /// Reads the bytes of a dictionary file. Matrices borrow the bytes if those start at a multiple of four in memory, as a mapped file
-    /// does. No input makes it panic or allocate beyond `budget`.
+    /// Reads the bytes of a dictionary file. Matrices borrow the bytes if those start at a multiple of four in memory,
+    /// as a mapped file does. No input makes it panic or allocate beyond `budget`.
     ///
-    /// Cost: two passes over the bytes. Matrices are copied if the bytes are not aligned, and some matrices of version 1 always are.
+    /// Cost: two passes over the bytes. Matrices are copied if the bytes are not aligned, and some matrices of version
+    /// 1 always are.
     ///
     /// # Errors
     /// [`DictionaryError`], for the first fault found.
@@ -68,7 +70,8 @@ impl Dictionary {
         Self::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
     }
 
-    /// Reads the bytes of a dictionary file and decodes every matrix. No input makes it panic or allocate beyond `budget`.
+    /// Reads the bytes of a dictionary file and decodes every matrix. No input makes it panic or allocate beyond
+    /// `budget`.
     ///
     /// # Errors
     /// The errors of [`StoredDictionary::read`].

@@ -1,8 +1,9 @@
 //! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
 //!
-//! The cost of a frame depends on what is lit and what changed, not on the size of the level. A block that no light reaches costs
-//! nothing. A block whose radiosity did not change keeps its coefficients, and a block keeps its light if no changed block sends
-//! light to it. Kept values have the same bits as recomputed ones, unless [`FrameConfig::tolerance`] allows differences.
+//! The cost of a frame depends on what is lit and what changed, not on the size of the level. A block that no light
+//! reaches costs nothing. A block whose radiosity did not change keeps its coefficients, and a block keeps its light if
+//! no changed block sends light to it. Kept values have the same bits as recomputed ones, unless
+//! [`FrameConfig::tolerance`] allows differences.
 
 pub mod config;
 pub mod error;
@@ -45,13 +46,13 @@ use std::num::NonZero;
 
 /// The light of a scene, frame by frame.
 ///
-/// A frame keeps its [`Scene`], and owns all that changes while a game runs: lights, doors, albedo and emission of walls, and the
-/// buffers of every stage. Solving allocates nothing, with three exceptions: the caller's
-/// [`Executor`](crate::executor::Executor) may allocate, so does a frame whose previous [`FrameReport`] still exists, and so does
-/// a list of skipped lights that is longer than all before.
+/// A frame keeps its [`Scene`], and owns all that changes while a game runs: lights, doors, albedo and emission of
+/// walls, and the buffers of every stage. Solving allocates nothing, with three exceptions: the caller's
+/// [`Executor`](crate::executor::Executor) may allocate, so does a frame whose previous [`FrameReport`] still exists,
+/// and so does a list of skipped lights that is longer than all before.
 ///
-/// Signals are copied out block by block in the level's order, in a block channel by channel (red, green, blue), in a channel
-/// texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).
+/// Signals are copied out block by block in the level's order, in a block channel by channel (red, green, blue), in a
+/// channel texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).
 #[derive(Debug)]
 pub struct Frame {
     scene: Scene,
@@ -111,8 +112,9 @@ impl Frame {
 
 /// Adding, changing and removing lights.
 impl Frame {
-    /// Adds a light, which shines from the next solve on. Every light gets an id: a light with values out of range, in no block, or
-    /// beyond [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS) is skipped, and [`FrameReport::skipped_lights`] names it.
+    /// Adds a light, which shines from the next solve on. Every light gets an id: a light with values out of range, in
+    /// no block, or beyond [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS) is skipped, and
+    /// [`FrameReport::skipped_lights`] names it.
     pub fn add_light(&mut self, light: Light) -> LightId {
         self.lights.add(&self.scene.level, light)
     }
@@ -127,8 +129,8 @@ impl Frame {
         self.lights.remove(&self.scene.level, id)
     }
 
-    /// Replaces all lights; earlier ids no longer name a light. For games that keep a list of their own: an unchanged light at an
-    /// unchanged position in the list is not computed again.
+    /// Replaces all lights; earlier ids no longer name a light. For games that keep a list of their own: an unchanged
+    /// light at an unchanged position in the list is not computed again.
     pub fn set_lights(&mut self, lights: &[Light]) {
         self.lights.replace(&self.scene.level, lights);
     }
@@ -146,9 +148,10 @@ impl Frame {
 
 /// Doors, colours and scenes that change while a game runs.
 impl Frame {
-    /// Opens or closes a door, named by its position in [`Level::doors`](crate::level::block::Level::doors), for direct and indirect
-    /// light. 1 lets all light through, 0 none; light that does not pass is lost. It takes effect in the next solve. With
-    /// [`Rays`](crate::light::visibility::Rays), the caller's function must take doors into account for direct light.
+    /// Opens or closes a door, named by its position in [`Level::doors`](crate::level::block::Level::doors), for direct
+    /// and indirect light. 1 lets all light through, 0 none; light that does not pass is lost. It takes effect in the
+    /// next solve. With [`Rays`](crate::light::visibility::Rays), the caller's function must take doors into account
+    /// for direct light.
     ///
     /// # Errors
     /// [`FrameError::Door`], if there is no such door or the value is not in [0, 1].
@@ -173,12 +176,12 @@ impl Frame {
         &self.light.doors
     }
 
-    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels. Texels in holes
-    /// stay black. The next solve computes all light that it changes.
+    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels.
+    /// Texels in holes stay black. The next solve computes all light that it changes.
     ///
     /// # Errors
-    /// [`SurfaceError`], if there is no such block, if the number of values is not the number of texels, or if a value is outside
-    /// [0, 1]. The frame is then unchanged.
+    /// [`SurfaceError`], if there is no such block, if the number of values is not the number of texels, or if a value
+    /// is outside [0, 1]. The frame is then unchanged.
     pub fn set_texel_albedo(
         &mut self,
         block: BlockIndex,
@@ -189,8 +192,8 @@ impl Frame {
         Ok(())
     }
 
-    /// Gives each texel of a block an emitted radiosity of its own, linear RGB, W/m², in the order of the canonical shape's texels.
-    /// Texels in holes stay black.
+    /// Gives each texel of a block an emitted radiosity of its own, linear RGB, W/m², in the order of the canonical
+    /// shape's texels. Texels in holes stay black.
     ///
     /// # Errors
     /// [`SurfaceError`], as in [`Frame::set_texel_albedo`], if a value is outside [0, 1e9].
@@ -217,9 +220,9 @@ impl Frame {
         Some(self.surface.emission.get(slot))
     }
 
-    /// Replaces the scene, such as by the same level with blocks added or removed. Lights and their ids stay. For each block of the
-    /// new scene, `old_block` may name the same block in the present scene; if both have the same shape, its indirect light stays.
-    /// All other blocks start dark. Doors and colours are those of the new level.
+    /// Replaces the scene, such as by the same level with blocks added or removed. Lights and their ids stay. For each
+    /// block of the new scene, `old_block` may name the same block in the present scene; if both have the same shape,
+    /// its indirect light stays. All other blocks start dark. Doors and colours are those of the new level.
     ///
     /// Allocates the buffers of the new scene.
     pub fn change_scene(
@@ -252,7 +255,8 @@ impl Frame {
             if old.has_indirect {
                 next.schedule.state[rank.get()].has_indirect = true;
                 next.schedule.touch(rank, f32::INFINITY);
-                // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their turn.
+                // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their
+                // turn.
                 next.schedule.mark_changed(rank);
             }
         }
@@ -297,12 +301,12 @@ impl Frame {
         self.finish(clock)
     }
 
-    /// Same as [`Frame::solve`], from direct irradiance that the caller computed, W/m², in the order of [`Frame::copy_direct_to`]. The
-    /// lights of the frame do not shine, and the report has no skipped lights.
+    /// Same as [`Frame::solve`], from direct irradiance that the caller computed, W/m², in the order of
+    /// [`Frame::copy_direct_to`]. The lights of the frame do not shine, and the report has no skipped lights.
     ///
     /// # Errors
-    /// [`FrameError::Direct`], if the number of values is not three for each texel, or a value is negative, too large or NaN. The
-    /// frame is then unchanged.
+    /// [`FrameError::Direct`], if the number of values is not three for each texel, or a value is negative, too large
+    /// or NaN. The frame is then unchanged.
     pub fn solve_from_direct(&mut self, direct: &[f32]) -> Result<FrameReport, FrameError> {
         let mut clock = StageClock::start();
         let is_irradiance = |e: &f32| (0.0..=MAX_LIGHT_VALUE).contains(e);
@@ -342,7 +346,8 @@ impl Frame {
         };
         report.passes = bounces.run();
         if report.passes == 0 {
-            // Truncation can leave a little light in probes of blocks whose walls are dark, and those blocks are in no list.
+            // Truncation can leave a little light in probes of blocks whose walls are dark, and those blocks are in no
+            // list.
             self.outputs.darken();
         }
         self.outputs.fill(OutputStage {
@@ -365,8 +370,8 @@ impl Frame {
         self.report.finish()
     }
 
-    /// Makes the next solve compute everything again. For measurements, and for callers whose shadows changed without a new
-    /// [`version`](Visibility::version).
+    /// Makes the next solve compute everything again. For measurements, and for callers whose shadows changed without a
+    /// new [`version`](Visibility::version).
     pub fn forget(&mut self) {
         self.direct_stage.forget();
         self.schedule.all_stale = true;
@@ -410,7 +415,8 @@ impl Frame {
         Some(self.light.indirect.get(slot))
     }
 
-    /// The padded lightmap of indirect irradiance; without pixels unless [`Outputs::lightmap`](config::Outputs::lightmap) is set.
+    /// The padded lightmap of indirect irradiance; without pixels unless
+    /// [`Outputs::lightmap`](config::Outputs::lightmap) is set.
     pub fn lightmap(&self) -> Lightmap<'_> {
         Lightmap::new(&self.scene.atlas, &self.outputs.lightmap)
     }
@@ -420,8 +426,9 @@ impl Frame {
         self.outputs.probes.as_ref()
     }
 
-    /// Spherical harmonics of indirect radiance in world axes, with RGB for each, at a point in metres: trilinear between the probes
-    /// around it. `None` outside all blocks, and without probes ([`Outputs::probes`](config::Outputs::probes)).
+    /// Spherical harmonics of indirect radiance in world axes, with RGB for each, at a point in metres: trilinear
+    /// between the probes around it. `None` outside all blocks, and without probes
+    /// ([`Outputs::probes`](config::Outputs::probes)).
     ///
     /// Cost: independent of the number of blocks.
     pub fn probe_at(&self, point: Vec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
@@ -429,22 +436,22 @@ impl Frame {
         probes.at(&self.scene.level, point.as_dvec3())
     }
 
-    /// Indirect irradiance, W/m², RGB, on a surface with a unit normal at a point in metres, such as the surface of a moving object;
-    /// `None` where [`Frame::probe_at`] is `None`.
+    /// Indirect irradiance, W/m², RGB, on a surface with a unit normal at a point in metres, such as the surface of a
+    /// moving object; `None` where [`Frame::probe_at`] is `None`.
     pub fn irradiance_at(&self, point: Vec3, normal: Vec3) -> Option<Vec3> {
         Some(irradiance_from_probe(&self.probe_at(point)?, normal))
     }
 
-    /// Vector irradiance: block by block, in a block channel by channel, in a channel texel by texel, for each texel four coefficients
-    /// of 1, v, normal and u in the texel's tangent frame. [`evaluate_f32`] gives the irradiance for a normal. Empty unless
-    /// [`Outputs::vector`](config::Outputs::vector) is set and the dictionary has it.
+    /// Vector irradiance: block by block, in a block channel by channel, in a channel texel by texel, for each texel
+    /// four coefficients of 1, v, normal and u in the texel's tangent frame. [`evaluate_f32`] gives the irradiance for
+    /// a normal. Empty unless [`Outputs::vector`](config::Outputs::vector) is set and the dictionary has it.
     pub fn vector(&self) -> &[f32] {
         &self.outputs.vector
     }
 
-    /// Indirect irradiance, W/m², RGB, at one texel of a block for a unit normal in the texel's tangent frame (its components along u,
-    /// along v, along the wall's normal); 0 where truncation makes it negative. `None` if there is no such block or texel, and
-    /// without vector irradiance ([`Outputs::vector`](config::Outputs::vector)).
+    /// Indirect irradiance, W/m², RGB, at one texel of a block for a unit normal in the texel's tangent frame (its
+    /// components along u, along v, along the wall's normal); 0 where truncation makes it negative. `None` if there is
+    /// no such block or texel, and without vector irradiance ([`Outputs::vector`](config::Outputs::vector)).
     pub fn vector_at(&self, block: BlockIndex, texel: usize, normal: Vec3) -> Option<Vec3> {
         let range = &self.scene.level.block(block)?.texels;
         if texel >= range.len() || self.outputs.vector.is_empty() {

@@ -1,5 +1,6 @@
-//! `T_b->r` in the form of the paper, for tools that compare with it: responses for each opening that light enters by, before
-//! [`Scene::assemble`](crate::modular::scene::Scene::assemble) projects them on joint bases (Loos et al. 2011, section 6.3).
+//! `T_b->r` in the form of the paper, for tools that compare with it: responses for each opening that light enters by,
+//! before [`Scene::assemble`](crate::modular::scene::Scene::assemble) projects them on joint bases (Loos et al. 2011,
+//! section 6.3).
 
 use crate::level::block::Level;
 use crate::level::block_index::BlockIndex;
@@ -19,7 +20,8 @@ pub struct OpeningResponses {
     pub target: BlockIndex,
     /// Position, in the openings of that block's shape, of the opening that light enters by.
     pub opening: usize,
-    /// Whether responses are in the opening's frame with x and y exchanged. Always false in levels whose openings all have +y up.
+    /// Whether responses are in the opening's frame with x and y exchanged. Always false in levels whose openings all
+    /// have +y up.
     pub exchanged: bool,
     /// The block that light comes from.
     pub source: BlockIndex,
@@ -27,8 +29,8 @@ pub struct OpeningResponses {
     pub responses: Matrix<f32>,
 }
 
-/// All responses of a scene, source by source, with open doors. Multiplied by `U_r` of each opening, they make the same light as the
-/// scene; `U_r` is the joint basis times
+/// All responses of a scene, source by source, with open doors. Multiplied by `U_r` of each opening, they make the same
+/// light as the scene; `U_r` is the joint basis times
 /// [`joint_from_response`](crate::modular::dictionary::OpeningOperators::joint_from_response).
 ///
 /// Cost: the time of assembling the scene again, and k_r x k_b numbers for each opening and source.

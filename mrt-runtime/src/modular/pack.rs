@@ -35,11 +35,12 @@ impl Default for PackConfig {
 
 /// The part of a dictionary that a level uses: its shapes, their variants, and the paths that light takes in it.
 ///
-/// If lightfields are kept, the scene of the level is the same to the last bit, at every depth. Otherwise, light ends at the longest
-/// path of the table. Matrices are cloned; borrowed ones are not copied.
+/// If lightfields are kept, the scene of the level is the same to the last bit, at every depth. Otherwise, light ends
+/// at the longest path of the table. Matrices are cloned; borrowed ones are not copied.
 ///
 /// # Errors
-/// The errors of [`Scene::assemble`](crate::modular::scene::Scene::assemble) with default settings, except [`AssembleError::TooLarge`].
+/// The errors of [`Scene::assemble`](crate::modular::scene::Scene::assemble) with default settings, except
+/// [`AssembleError::TooLarge`].
 pub fn pack<M: OperatorMatrix>(
     level: &Level,
     dictionary: &Dictionary<M>,

@@ -1,11 +1,12 @@
 //! Paths of light through openings, in canonical form.
 //!
-//! A straight ray through a grid of cubes never uses two opposite headings. A symmetry of the cube makes its first heading +z, the first
-//! other heading +x, and the third +y. So a path is a word over the letters z, x and y. A dictionary stores one operator for each word;
-//! for a path in a level, assembly finds the word, and the symmetry that takes the word to the path.
+//! A straight ray through a grid of cubes never uses two opposite headings. A symmetry of the cube makes its first
+//! heading +z, the first other heading +x, and the third +y. So a path is a word over the letters z, x and y. A
+//! dictionary stores one operator for each word; for a path in a level, assembly finds the word, and the symmetry that
+//! takes the word to the path.
 //!
-//! Light leaves the canonical emitter, a unit cube, through z = 1. Light enters the canonical receiver, a unit cube, through z = 0,
-//! heading for +z.
+//! Light leaves the canonical emitter, a unit cube, through z = 1. Light enters the canonical receiver, a unit cube,
+//! through z = 0, heading for +z.
 
 use crate::level::shape::{Hole, Outline};
 use mrt_core::geometry::cube::Face;
@@ -55,8 +56,8 @@ impl Word {
         self.0.iter().any(|crossing| crossing.heading == heading)
     }
 
-    /// All words without a hole of up to `depth` crossings, and all with exactly one hole of up to `hole_depth` crossings. Without
-    /// `vertical`, no word has heading +y.
+    /// All words without a hole of up to `depth` crossings, and all with exactly one hole of up to `hole_depth`
+    /// crossings. Without `vertical`, no word has heading +y.
     pub fn all(depth: usize, hole_depth: usize, holes: &[Hole], vertical: bool) -> Vec<Word> {
         let mut words = Vec::new();
         let mut front = vec![Word::default()];
@@ -112,7 +113,8 @@ impl Word {
         name
     }
 
-    /// The word with that [`name`](Word::name); `None` if the text is not a canonical word of up to [`MAX_WORD`] crossings.
+    /// The word with that [`name`](Word::name); `None` if the text is not a canonical word of up to [`MAX_WORD`]
+    /// crossings.
     pub fn from_name(name: &str) -> Option<Word> {
         let mut word = Word::default();
         for letter in name.chars() {
@@ -158,8 +160,8 @@ pub fn hole_of(outline: Outline) -> Option<HoleIndex> {
     }
 }
 
-/// The reference frame of a heading: the rotation that takes the canonical heading +z to it. For side headings, +y stays up; for the
-/// other two, +y turns to +z or -z.
+/// The reference frame of a heading: the rotation that takes the canonical heading +z to it. For side headings, +y
+/// stays up; for the other two, +y turns to +z or -z.
 pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
     let images = match heading {
         Face::PosZ => [Face::PosX, Face::PosY, Face::PosZ],
@@ -172,8 +174,8 @@ pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
     CubeSymmetry::from_images(images[0], images[1], images[2]).unwrap_or(CubeSymmetry::IDENTITY)
 }
 
-/// The difference between a frame and the reference frame of its heading ([`frame_of_heading`]): `frame = reference after exchange after
-/// mirrors`.
+/// The difference between a frame and the reference frame of its heading ([`frame_of_heading`]): `frame = reference
+/// after exchange after mirrors`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Roll {
     /// Whether x and y are exchanged.

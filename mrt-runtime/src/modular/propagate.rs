@@ -1,12 +1,12 @@
 //! Carries the light of each block through openings to all other blocks: `T_b->r` (Loos et al. 2011, section 6.3).
 //!
 //! Departures from the paper:
-//! 1. A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of openings that turns back carries
-//!    no light. Such sequences are left out; the paper follows all.
-//! 2. The dictionary's table has the operator of a whole sequence ([`table`]). Longer sequences pass lightfields on from opening to
-//!    opening as in the paper ([`lightfield`]), if the dictionary has lightfields.
-//! 3. Both give responses at the opening that light enters by. They are projected on the joint basis of the block behind it; the paper
-//!    keeps a basis for each opening.
+//! 1. A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of openings that
+//!    turns back carries no light. Such sequences are left out; the paper follows all.
+//! 2. The dictionary's table has the operator of a whole sequence ([`table`]). Longer sequences pass lightfields on
+//!    from opening to opening as in the paper ([`lightfield`]), if the dictionary has lightfields.
+//! 3. Both give responses at the opening that light enters by. They are projected on the joint basis of the block
+//!    behind it; the paper keeps a basis for each opening.
 
 pub(crate) mod arrivals;
 pub(crate) mod context;
@@ -28,8 +28,8 @@ use crate::modular::propagate::table::Table;
 use crate::modular::scene::SceneData;
 use mrt_core::linalg::matrix::{Matrix, multiply, multiply_add};
 
-/// Assembles the operator from the coefficients b of all blocks to the joint coefficients of all blocks, which may take up to
-/// `max_bytes`.
+/// Assembles the operator from the coefficients b of all blocks to the joint coefficients of all blocks, which may take
+/// up to `max_bytes`.
 pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     scene: &SceneData,
     dictionary: &Dictionary<M>,
@@ -76,7 +76,8 @@ pub(crate) fn follow_all<M: OperatorMatrix>(
     let blocks = &context.scene.level.blocks;
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let mut openings = blocks.iter().flat_map(|block| block.shape.openings);
-    // The table has a depth for paths without a hole, with one, and with more; only levels with holes need the last two.
+    // The table has a depth for paths without a hole, with one, and with more; only levels with holes need the last
+    // two.
     let holes = if openings.any(has_hole) { 3 } else { 1 };
     let goes_on = covered[..holes].iter().any(|&d| d < config.max_depth);
     // With a dictionary that was packed without lightfields, light ends where the table does.

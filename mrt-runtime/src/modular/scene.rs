@@ -66,7 +66,8 @@ pub struct SceneBlock {
     pub shape_index: usize,
     /// Range of the block's coefficients b among those of all blocks.
     pub coefficients: Range<usize>,
-    /// Range of the block's joint coefficients among those of all blocks. The first of them take the block's own coefficients b.
+    /// Range of the block's joint coefficients among those of all blocks. The first of them take the block's own
+    /// coefficients b.
     pub joint: Range<usize>,
     /// Orthogonal matrix from the axes of the block's probes to those of the world.
     pub world_from_probe: DMat3,
@@ -75,7 +76,8 @@ pub struct SceneBlock {
 /// The layout of coefficients in a frame's memory: the same number of rows for every block, channel by channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientLayout {
-    /// Rows of a block in each channel: at least the [`rows`](PackedShape::rows) of every shape, with padding that stays zero.
+    /// Rows of a block in each channel: at least the [`rows`](PackedShape::rows) of every shape, with padding that
+    /// stays zero.
     pub count: usize,
     /// By shape: for each coefficient b, its row.
     pub row_of_mode: Vec<Vec<u16>>,

@@ -34,8 +34,8 @@ impl<'a> Lightmap<'a> {
         self.pixels
     }
 
-    /// Texture coordinates in [0, 1]² at which a bilinear filter reads the light at (u, v) in [0, 1]² of a block's canonical wall;
-    /// `None` for openings and blocks that do not exist.
+    /// Texture coordinates in [0, 1]² at which a bilinear filter reads the light at (u, v) in [0, 1]² of a block's
+    /// canonical wall; `None` for openings and blocks that do not exist.
     pub fn texture_coordinate(
         &self,
         block: BlockIndex,
@@ -52,8 +52,9 @@ impl<'a> Lightmap<'a> {
         self.atlas.sample(self.pixels, coordinate * size)
     }
 
-    /// Writes a tile as half-precision numbers with an alpha of 1, row by row: `size`² pixels of `RGBA16F`. Values above 65,504
-    /// become 65,504. The content of `out` is replaced; a tile that is not in the image leaves `out` empty.
+    /// Writes a tile as half-precision numbers with an alpha of 1, row by row: `size`² pixels of `RGBA16F`. Values
+    /// above 65,504 become 65,504. The content of `out` is replaced; a tile that is not in the image leaves `out`
+    /// empty.
     pub fn write_rgba16f(&self, tile: Tile, out: &mut Vec<[u16; 4]>) {
         const ONE: u16 = 0x3c00;
         out.clear();
@@ -64,9 +65,9 @@ impl<'a> Lightmap<'a> {
         out.extend(pixels);
     }
 
-    /// Writes a tile with a shared exponent, row by row: `size`² pixels of `RGB9E5`. Values above 65,408 become 65,408. The error
-    /// is at most 1/511 of a pixel's largest channel, and 2^-25 where that is less. The content of `out` is replaced; a tile that
-    /// is not in the image leaves `out` empty.
+    /// Writes a tile with a shared exponent, row by row: `size`² pixels of `RGB9E5`. Values above 65,408 become 65,408.
+    /// The error is at most 1/511 of a pixel's largest channel, and 2^-25 where that is less. The content of `out` is
+    /// replaced; a tile that is not in the image leaves `out` empty.
     pub fn write_rgb9e5(&self, tile: Tile, out: &mut Vec<u32>) {
         out.clear();
         out.extend(self.pixels_of(tile).map(rgb9e5));

@@ -1,8 +1,9 @@
-//! The padded lightmap atlas (Loos et al. 2011, section 6.2): one tile for each wall, with a border of one pixel for bilinear
-//! filters.
+//! The padded lightmap atlas (Loos et al. 2011, section 6.2): one tile for each wall, with a border of one pixel for
+//! bilinear filters.
 //!
-//! Across an opening, the border shows the wall of the neighbouring block, so joined blocks have no seam. At a crease inside a
-//! block, it repeats the wall's own edge. The charts of a tube meet without a crease, so their borders show each other.
+//! Across an opening, the border shows the wall of the neighbouring block, so joined blocks have no seam. At a crease
+//! inside a block, it repeats the wall's own edge. The charts of a tube meet without a crease, so their borders show
+//! each other.
 
 use crate::executor::{Executor, run_parts, task_count};
 use crate::level::block_index::BlockIndex;
@@ -108,8 +109,8 @@ impl LightmapAtlas {
         self.shown.extend(shows.iter().map(|shows| shows.tile));
     }
 
-    /// Pixel coordinates (x to the right, y downwards, pixel centres at halves) at which a bilinear filter reads the light at
-    /// (u, v) in [0, 1]² of a block's canonical wall; `None` for openings and blocks that do not exist.
+    /// Pixel coordinates (x to the right, y downwards, pixel centres at halves) at which a bilinear filter reads the
+    /// light at (u, v) in [0, 1]² of a block's canonical wall; `None` for openings and blocks that do not exist.
     pub fn pixel(&self, block: BlockIndex, face: Face, u: f32, v: f32) -> Option<Vec2> {
         let [x, y] = self.tiles.get(block.get())?[face.index()]?;
         let scale = self.resolution as f32;
@@ -129,8 +130,8 @@ impl LightmapAtlas {
         Some(self.pixel(block, face, u, v)? / size)
     }
 
-    /// Bilinear lookup, at pixel coordinates from [`LightmapAtlas::pixel`], in an image of this layout; 0 if the image has another
-    /// size.
+    /// Bilinear lookup, at pixel coordinates from [`LightmapAtlas::pixel`], in an image of this layout; 0 if the image
+    /// has another size.
     pub fn sample(&self, image: &[[f32; 3]], pixel: Vec2) -> [f32; 3] {
         // A level of open blocks only has no walls.
         if self.width == 0 || self.height == 0 || image.len() != self.width * self.height {
@@ -176,7 +177,8 @@ impl LightmapAtlas {
         self.shown.len()
     }
 
-    /// Copies texels to the tiles that show the changed blocks, and writes the list of those tiles, ascending, to `tiles`.
+    /// Copies texels to the tiles that show the changed blocks, and writes the list of those tiles, ascending, to
+    /// `tiles`.
     pub(crate) fn fill(
         &self,
         changed: &[BlockRank],
@@ -272,13 +274,14 @@ struct Place {
 /// Distance, in u, beyond an opening at which the border of a tube's tile looks for the neighbour's first texel.
 const PAST: f64 = 1e-6;
 
-/// The texel, as (block, index in the block), that a tile shows at (column, row), both in -1..=resolution. One step outside the
-/// wall, it is in the neighbour's wall across an opening, or the nearest texel of the wall itself at a crease.
+/// The texel, as (block, index in the block), that a tile shows at (column, row), both in -1..=resolution. One step
+/// outside the wall, it is in the neighbour's wall across an opening, or the nearest texel of the wall itself at a
+/// crease.
 ///
-/// Up to four blocks meet at the corner between two openings of a block, and a filter must read the same mean there from all of
-/// their tiles. With four blocks, each tile shows all four. Around a pillar there are three, and each tile shows the middle block
-/// twice: the middle block's own tile in its corner pixel, the other two tiles in the pixel beside it, at their crease with the
-/// pillar.
+/// Up to four blocks meet at the corner between two openings of a block, and a filter must read the same mean there
+/// from all of their tiles. With four blocks, each tile shows all four. Around a pillar there are three, and each tile
+/// shows the middle block twice: the middle block's own tile in its corner pixel, the other two tiles in the pixel
+/// beside it, at their crease with the pillar.
 fn texel_seen(
     blocks: &[PlacedBlock],
     block: usize,
@@ -322,8 +325,8 @@ fn texel_seen(
 
 /// The texel of a tube's wall at a point. If the point is past an opening, it is a texel of the tube beyond.
 ///
-/// The charts of every tube are quarters of its section, and joined openings are the same disc, so rows of texels continue from
-/// tube to tube and around each tube.
+/// The charts of every tube are quarters of its section, and joined openings are the same disc, so rows of texels
+/// continue from tube to tube and around each tube.
 fn texel_seen_in_tube(
     blocks: &[PlacedBlock],
     block: usize,
@@ -376,7 +379,8 @@ fn corner(axis: usize, k: isize, last: isize) -> Option<Face> {
     (k == 0 || k == last).then(|| Face::from_axis(axis, k > 0))
 }
 
-/// The point that a pixel beyond `side` shows. `corner` is the other side that the pixel is next to, if it is at an end.
+/// The point that a pixel beyond `side` shows. `corner` is the other side that the pixel is next to, if it is at an
+/// end.
 fn beside(blocks: &[PlacedBlock], here: Place, side: Face, corner: Option<Face>) -> Place {
     if let (1, place) = walk(blocks, here, [side]) {
         return place;
@@ -390,8 +394,8 @@ fn beside(blocks: &[PlacedBlock], here: Place, side: Face, corner: Option<Face>)
     }
 }
 
-/// Follows a wall into the next block across each of `sides`, named as in the block of `from`, up to the first side that does not
-/// lead on. Returns how many sides were crossed, and the point in the last block.
+/// Follows a wall into the next block across each of `sides`, named as in the block of `from`, up to the first side
+/// that does not lead on. Returns how many sides were crossed, and the point in the last block.
 fn walk<const N: usize>(
     blocks: &[PlacedBlock],
     from: Place,

@@ -11,9 +11,9 @@ pub(crate) fn f16_bits(x: f32) -> u16 {
     f16::from_f32(x.clamp(-largest, largest)).to_bits()
 }
 
-/// Three numbers with 9 bits each and a shared exponent: Vulkan's `E5B9G9R9_UFLOAT_PACK32`, OpenGL's `RGB9_E5` (Khronos data
-/// format specification, section 10.6). Negative numbers and NaN become 0, numbers above 65,408 become 65,408. The error is at
-/// most 1/511 of the largest of the three, and 2^-25 where that is less.
+/// Three numbers with 9 bits each and a shared exponent: Vulkan's `E5B9G9R9_UFLOAT_PACK32`, OpenGL's `RGB9_E5` (Khronos
+/// data format specification, section 10.6). Negative numbers and NaN become 0, numbers above 65,408 become 65,408. The
+/// error is at most 1/511 of the largest of the three, and 2^-25 where that is less.
 pub(crate) fn rgb9e5(rgb: [f32; 3]) -> u32 {
     const MANTISSA_BITS: i32 = 9;
     const BIAS: i32 = 15;
@@ -56,8 +56,8 @@ mod tests {
         for rgb in colours {
             let rgb = rgb.map(|x: f32| x.min(65_408.0));
             let largest = f64::from(rgb[0].max(rgb[1]).max(rgb[2]));
-            // Half a step. The largest takes at least 256 steps, or 255.5 where rounding carried. Below 2^-16 the exponent is 0
-            // and a step is 2^-24.
+            // Half a step. The largest takes at least 256 steps, or 255.5 where rounding carried. Below 2^-16 the
+            // exponent is 0 and a step is 2^-24.
             let bound = (largest / 511.0).max(2f64.powi(-25));
             for (x, found) in rgb.into_iter().zip(decode(rgb9e5(rgb))) {
                 assert!((f64::from(x) - found).abs() <= bound, "{rgb:?}: {found}");

@@ -1,7 +1,7 @@
 //! Probes: incident indirect light on a grid in every block, for moving objects (Loos et al. 2011, section 6.5).
 //!
-//! A probe holds spherical harmonics of incident radiance in world axes. They come from the same joint coefficients as the light
-//! of the walls. Between probes, light is interpolated, across openings too.
+//! A probe holds spherical harmonics of incident radiance in world axes. They come from the same joint coefficients as
+//! the light of the walls. Between probes, light is interpolated, across openings too.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedLevel};
@@ -77,8 +77,8 @@ impl Kernel for Turn<'_> {
 
 /// The probes of a scene after a frame.
 ///
-/// They are stored block by block; in a block probe by probe, x fastest, then y, then z, at (i + 0.5) / n of the canonical cube; in
-/// a probe coefficient by coefficient, with RGB for each.
+/// They are stored block by block; in a block probe by probe, x fastest, then y, then z, at (i + 0.5) / n of the
+/// canonical cube; in a probe coefficient by coefficient, with RGB for each.
 #[derive(Clone, Debug)]
 pub struct Probes {
     order: ProbeOrder,
@@ -91,8 +91,8 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Dark probes, `per_axis`³ in each block. `world_from_probe` gives, for each block, the matrix from the axes of its probes to
-    /// those of the world.
+    /// Dark probes, `per_axis`³ in each block. `world_from_probe` gives, for each block, the matrix from the axes of
+    /// its probes to those of the world.
     pub(crate) fn new(
         order: ProbeOrder,
         per_axis: usize,
@@ -133,8 +133,8 @@ impl Probes {
             .unwrap_or(&[])
     }
 
-    /// Writes all coefficients, in the same order, as bits of half-precision numbers for a texture. Values beyond ±65,504 become
-    /// ±65,504. The content of `out` is replaced.
+    /// Writes all coefficients, in the same order, as bits of half-precision numbers for a texture. Values beyond
+    /// ±65,504 become ±65,504. The content of `out` is replaced.
     pub fn write_f16(&self, out: &mut Vec<[u16; 3]>) {
         out.clear();
         out.extend(self.values.iter().map(|value| value.map(f16_bits)));
@@ -145,8 +145,8 @@ impl Probes {
         self.values.fill([0.0; 3]);
     }
 
-    /// Replaces the probes of one block. `expand` writes their light in the block's own axes: for each channel coefficient by
-    /// coefficient, for each coefficient probe by probe.
+    /// Replaces the probes of one block. `expand` writes their light in the block's own axes: for each channel
+    /// coefficient by coefficient, for each coefficient probe by probe.
     pub(crate) fn update(
         &mut self,
         block: BlockIndex,
@@ -177,9 +177,9 @@ impl Probes {
         }
     }
 
-    /// Light at a world position, metres: trilinear between the eight probes around it, those of joined blocks included; `None`
-    /// outside all blocks. Coefficients beyond the order of the probes are zero. Doors count as open: within half the spacing of
-    /// probes from a door, the result mixes the light of both sides.
+    /// Light at a world position, metres: trilinear between the eight probes around it, those of joined blocks
+    /// included; `None` outside all blocks. Coefficients beyond the order of the probes are zero. Doors count as open:
+    /// within half the spacing of probes from a door, the result mixes the light of both sides.
     pub fn at(&self, level: &PlacedLevel, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
         let block = level.block_at(point)?;
         let unit = level.block(block)?.warp.inverse(point)?;
@@ -204,8 +204,8 @@ impl Probes {
         Some(sum)
     }
 
-    /// The probe at a position of a block's grid. One step outside the grid, it is the neighbour's probe across an opening, or the
-    /// nearest probe inside at a wall.
+    /// The probe at a position of a block's grid. One step outside the grid, it is the neighbour's probe across an
+    /// opening, or the nearest probe inside at a wall.
     fn probe(&self, level: &PlacedLevel, block: BlockIndex, place: DVec3) -> &[[f32; 3]] {
         let n = self.per_axis as f64;
         let mut block = block;
@@ -241,7 +241,8 @@ impl Probes {
     }
 }
 
-/// Irradiance, W/m², on a surface of unit `normal` under a probe's light. Where truncation makes it negative, the result is 0.
+/// Irradiance, W/m², on a surface of unit `normal` under a probe's light. Where truncation makes it negative, the
+/// result is 0.
 pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {
     let channel = |c: usize| {
         let mut radiance = [0.0f32; PROBE_COEFFICIENTS];

@@ -1,5 +1,5 @@
-//! The layout of texels in a frame's memory. Blocks of one shape follow each other, and each texel has a **slot** in its block. The
-//! three colour channels are stored apart.
+//! The layout of texels in a frame's memory. Blocks of one shape follow each other, and each texel has a **slot** in
+//! its block. The three colour channels are stored apart.
 
 use crate::level::block_index::BlockIndex;
 use glam::Vec3;
@@ -37,8 +37,8 @@ pub struct TexelLayout {
     pub shapes: Vec<u32>,
     /// By shape: for each texel, its first slot within the block.
     pub slot_of_texel: Vec<Vec<u32>>,
-    /// By shape: for each slot of the block, its texel; `u32::MAX` for a slot without a texel. A texel on the plane of a mirror of
-    /// the shape has several slots.
+    /// By shape: for each slot of the block, its texel; `u32::MAX` for a slot without a texel. A texel on the plane of
+    /// a mirror of the shape has several slots.
     pub texel_of_slot: Vec<Vec<u32>>,
 }
 
@@ -91,7 +91,8 @@ impl TexelLayout {
         Some(self.slots[rank.get()].start + slot as usize)
     }
 
-    /// Replaces `out` by a signal in the level's order: block by block, in a block channel by channel, in a channel texel by texel.
+    /// Replaces `out` by a signal in the level's order: block by block, in a block channel by channel, in a channel
+    /// texel by texel.
     pub(crate) fn copy_by_texel(&self, signal: &Planes, out: &mut Vec<f32>) {
         out.clear();
         for &rank in &self.rank {
@@ -103,8 +104,8 @@ impl TexelLayout {
     }
 }
 
-/// Positions and normals of the texels of a level, by slot. A slot without a texel has the middle of its block as its position, and
-/// the normal 0.
+/// Positions and normals of the texels of a level, by slot. A slot without a texel has the middle of its block as its
+/// position, and the normal 0.
 #[derive(Clone, Debug)]
 pub struct TexelGeometry {
     /// World positions, metres.

@@ -7,8 +7,8 @@ use crate::level::placed::{PlacedBlock, Portal};
 use crate::light::source::Light;
 use glam::{DVec3, Vec3};
 
-/// Most planes of a beam. Openings with four corners give four planes, and more where crooked openings overlap; round openings
-/// exceed it.
+/// Most planes of a beam. Openings with four corners give four planes, and more where crooked openings overlap; round
+/// openings exceed it.
 pub const MAX_PLANES: usize = 16;
 
 /// Most corners of an opening: a tube's end has these.
@@ -17,12 +17,13 @@ const MAX_CORNERS: usize = 32;
 /// Most corners of an opening after clipping: each plane replaces one corner by two.
 const MAX_CLIPPED: usize = MAX_CORNERS + MAX_PLANES;
 
-/// Distance, in sizes of the opening or block, within which a point counts as on a plane: a thousand roundings of coordinates at
-/// [`FAR_LIMIT`](crate::level::error::FAR_LIMIT). Positions of texels in `f32` do not resolve a sliver of that width.
+/// Distance, in sizes of the opening or block, within which a point counts as on a plane: a thousand roundings of
+/// coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT). Positions of texels in `f32` do not resolve a sliver
+/// of that width.
 pub(super) const ON_PLANE: f64 = 1e-9;
 
-/// An opening passes no light if the cone meets less than this share of its area. It ends paths that only rounding keeps open,
-/// such as those around an edge where four blocks meet.
+/// An opening passes no light if the cone meets less than this share of its area. It ends paths that only rounding
+/// keeps open, such as those around an edge where four blocks meet.
 const SMALLEST_SHARE: f64 = 1e-10;
 
 /// A half-space: `p · normal + offset >= 0`, for p relative to the trace's origin.
@@ -102,8 +103,8 @@ struct SpotCone {
 }
 
 impl SpotCone {
-    /// A lower bound of the distance of a point from the cone, metres; negative inside. It is the distance, in the plane of axis
-    /// and point, from the line along the cone's side.
+    /// A lower bound of the distance of a point from the cone, metres; negative inside. It is the distance, in the
+    /// plane of axis and point, from the line along the cone's side.
     fn distance(&self, point: DVec3) -> f64 {
         let along = point.dot(self.axis);
         let across = (point - along * self.axis).length();
@@ -168,7 +169,8 @@ impl Passing<'_> {
             taken |= 1 << edge;
         }
         if turns.has_front && turns.has_back {
-            // A bent opening that is not convex as the light sees it: the planes of edges that are clipped away still cut.
+            // A bent opening that is not convex as the light sees it: the planes of edges that are clipped away still
+            // cut.
             taken = u64::MAX;
         }
         (out.count, out.is_exact) = (0, self.cone.is_exact);
@@ -212,8 +214,8 @@ impl Passing<'_> {
         Some(outline)
     }
 
-    /// Writes the plane of each edge, and tells on which sides of them the corners after the edges are. Where the light sees
-    /// a convex outline from its front, all are in front.
+    /// Writes the plane of each edge, and tells on which sides of them the corners after the edges are. Where the light
+    /// sees a convex outline from its front, all are in front.
     fn find_sides(&self, slack: f64, sides: &mut [Plane]) -> Turns {
         let mut turns = Turns::default();
         for (k, side) in sides.iter_mut().enumerate() {
@@ -227,8 +229,8 @@ impl Passing<'_> {
         turns
     }
 
-    /// Keeps light that runs against a bent opening's direction out of the cone: it can graze such an opening and pass its
-    /// outline, and receivers refuse it too. False if no light is left.
+    /// Keeps light that runs against a bent opening's direction out of the cone: it can graze such an opening and pass
+    /// its outline, and receivers refuse it too. False if no light is left.
     fn leaves_outwards(&self, slack: f64, out: &mut Cone) -> bool {
         let corners = &self.portal.corners;
         let outward = self.portal.outward.normalize();
@@ -258,8 +260,8 @@ struct Turns {
 #[derive(Clone, Debug)]
 struct Clipped {
     corners: [DVec3; MAX_CLIPPED],
-    /// For the edge from each corner to the next: the index of an edge of the opening, or the number of those edges plus the index
-    /// of a plane of the cone.
+    /// For the edge from each corner to the next: the index of an edge of the opening, or the number of those edges
+    /// plus the index of a plane of the cone.
     edges: [u8; MAX_CLIPPED],
     /// Distance of each corner from the plane of the last clipping.
     distances: [f64; MAX_CLIPPED],
@@ -274,7 +276,8 @@ impl Clipped {
         count: 0,
     };
 
-    /// Drops corners beyond [`MAX_CLIPPED`]. Only polygons that are not convex have so many, and the edges of those are not used.
+    /// Drops corners beyond [`MAX_CLIPPED`]. Only polygons that are not convex have so many, and the edges of those are
+    /// not used.
     fn push(&mut self, corner: DVec3, edge: u8) {
         if self.count < MAX_CLIPPED {
             (self.corners[self.count], self.edges[self.count]) = (corner, edge);
@@ -282,8 +285,8 @@ impl Clipped {
         }
     }
 
-    /// Writes the part of the polygon that is inside a plane, or outside by at most `slack` metres, to `out`. `None` if no corner
-    /// is inside; `Some(false)`, with `out` unchanged, if all are.
+    /// Writes the part of the polygon that is inside a plane, or outside by at most `slack` metres, to `out`. `None` if
+    /// no corner is inside; `Some(false)`, with `out` unchanged, if all are.
     fn clip(&mut self, plane: &Plane, edge: u8, slack: f64, out: &mut Self) -> Option<bool> {
         let mut inside = 0;
         let corners = &self.corners[..self.count];
@@ -371,8 +374,8 @@ impl Source {
         }
     }
 
-    /// The plane through the light and an edge, with the opening inside; [`Plane::NONE`], which everything is inside of, if the
-    /// light is on the line of the edge.
+    /// The plane through the light and an edge, with the opening inside; [`Plane::NONE`], which everything is inside
+    /// of, if the light is on the line of the edge.
     fn plane_through(&self, from: DVec3, to: DVec3) -> Plane {
         let normal = match self.toward {
             None => to.cross(from),

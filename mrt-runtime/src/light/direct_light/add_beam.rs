@@ -1,7 +1,7 @@
 //! A beam's light on the texels of its block, many texels at once.
 //!
-//! The formulas are those of [`irradiance`](crate::light::direct_light::irradiance) in `f32`; a polynomial gives the angle from a
-//! spot's axis.
+//! The formulas are those of [`irradiance`](crate::light::direct_light::irradiance) in `f32`; a polynomial gives the
+//! angle from a spot's axis.
 
 use crate::light::beam::Beam;
 use crate::light::limits::MIN_RADIUS;
@@ -21,15 +21,17 @@ pub struct TexelPlanes<'a> {
     pub normals: [&'a [f32]; 3],
 }
 
-/// Adds the irradiance, W/m², of one beam to `out`: red, green and blue, as long as the slices of `texels`. Padding gets exactly
+/// Adds the irradiance, W/m², of one beam to `out`: red, green and blue, as long as the slices of `texels`. Padding
+/// gets exactly
 /// 0. The beam must not be [exact](Beam::exact).
 ///
-/// At lit texels, the result differs from [`irradiance`](crate::light::direct_light::irradiance) by a factor of at most 1 ± 1e-5
-/// and, since cosines are rounded, by 1e-6 of the irradiance on a surface that faces the light. Between the angles of a spot, the
-/// falloff is that of an angle within 2e-6 rad. A texel within 1e-15 m of a light's centre gets too little; at the centre it
-/// gets nothing.
+/// At lit texels, the result differs from [`irradiance`](crate::light::direct_light::irradiance) by a factor of at most
+/// 1 ± 1e-5 and, since cosines are rounded, by 1e-6 of the irradiance on a surface that faces the light. Between the
+/// angles of a spot, the falloff is that of an angle within 2e-6 rad. A texel within 1e-15 m of a light's centre gets
+/// too little; at the centre it gets nothing.
 ///
-/// Cost: 20 to 40 instructions for each group of texels that fills the lanes of `level`, and 4 for each plane of the beam.
+/// Cost: 20 to 40 instructions for each group of texels that fills the lanes of `level`, and 4 for each plane of the
+/// beam.
 ///
 /// # Panics
 /// If the slices differ in length, or if their length is not a multiple of [`WIDEST`].
@@ -91,7 +93,8 @@ pub fn add_beam(
     }
 }
 
-/// Smallest difference, radians, between the angles of a spot: the polynomial resolves no less. A spot with a hard edge gets it.
+/// Smallest difference, radians, between the angles of a spot: the polynomial resolves no less. A spot with a hard edge
+/// gets it.
 const NARROWEST: f32 = 1e-6;
 
 /// Smallest distance, metres, at which directions from a light keep all their digits: its square is a normal number.
@@ -99,8 +102,8 @@ const NEAREST: f32 = 1e-15;
 
 /// A light whose irradiance on texels is computed without shadows.
 trait Unshadowed: Copy {
-    /// Irradiance on texels per intensity, or per irradiance of a light at infinity. `offset` leads from the beam's origin to the
-    /// texels.
+    /// Irradiance on texels per intensity, or per irradiance of a light at infinity. `offset` leads from the beam's
+    /// origin to the texels.
     fn factor<L: Lanes>(self, l: L, offset: [L::V; 3], normal: [L::V; 3]) -> L::V;
 }
 
@@ -234,8 +237,8 @@ const ASIN: [f32; 8] = [
     0.112_620_25,
 ];
 
-/// Angle between unit vectors, radians, within 2e-6 everywhere from 0 to π. It is computed from the chord, which is twice the sine
-/// of half the angle, because the cosine loses its digits near 0 and π.
+/// Angle between unit vectors, radians, within 2e-6 everywhere from 0 to π. It is computed from the chord, which is
+/// twice the sine of half the angle, because the cosine loses its digits near 0 and π.
 #[inline(always)]
 fn angle_between<L: Lanes>(l: L, a: [L::V; 3], b: [L::V; 3]) -> L::V {
     let (zero, two) = (l.splat(0.0), l.splat(2.0));

@@ -11,24 +11,25 @@ pub struct AssembleConfig {
     pub max_depth: usize,
     /// Most bytes of texels and `T_b->r` together.
     pub max_bytes: usize,
-    /// Number format of the operators of shapes. There are few of them, so `f32`, the fastest format, takes little memory.
+    /// Number format of the operators of shapes. There are few of them, so `f32`, the fastest format, takes little
+    /// memory.
     pub shape_storage: Storage,
     /// Number format of `T_b->r`, the largest part of a large level. With `f16`, the error of light is 0.02 %.
     pub transport_storage: Storage,
     /// Share in L2, in [0, 1), of the light from one block to another that may be left out to save work.
     ///
-    /// `None` chooses by the number of modes `k` of the source block, since few modes have a larger error anyway: 2 % from 32 modes on,
-    /// `0.02 (32 / k)²` below, 15 % at most. Measured with four lights in a maze of 41 blocks: a standard dictionary saves three tenths of
-    /// the products, with an error of 0.16 % beside the 2 % of its modes. A mobile dictionary saves half of the products, and its mean
-    /// error over six levels is 6.68 % instead of 6.64 %.
+    /// `None` chooses by the number of modes `k` of the source block, since few modes have a larger error anyway: 2 %
+    /// from 32 modes on, `0.02 (32 / k)²` below, 15 % at most. Measured with four lights in a maze of 41 blocks: a
+    /// standard dictionary saves three tenths of the products, with an error of 0.16 % beside the 2 % of its modes. A
+    /// mobile dictionary saves half of the products, and its mean error over six levels is 6.68 % instead of 6.64 %.
     pub negligible: Option<f32>,
 }
 
 /// How light is carried from block to block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Coupling {
-    /// By the dictionary's table, which has an operator for each whole path of openings, and by lightfields beyond its longest paths. If
-    /// the dictionary was baked without paths, as dictionaries of tubes are, by lightfields only.
+    /// By the dictionary's table, which has an operator for each whole path of openings, and by lightfields beyond its
+    /// longest paths. If the dictionary was baked without paths, as dictionaries of tubes are, by lightfields only.
     #[default]
     Table,
     /// By lightfields passed on from opening to opening, as in the paper.
@@ -39,8 +40,8 @@ pub enum Coupling {
 pub const MAX_DEPTH: usize = 64;
 
 impl Default for AssembleConfig {
-    /// Eight openings, 2 GiB, `f32` for shapes and `f16` for transport. Less than 0.1 % of one-bounce light arrives beyond eight
-    /// openings.
+    /// Eight openings, 2 GiB, `f32` for shapes and `f16` for transport. Less than 0.1 % of one-bounce light arrives
+    /// beyond eight openings.
     fn default() -> Self {
         Self {
             coupling: Coupling::default(),

@@ -48,10 +48,12 @@ pub enum AssembleError {
         block: usize,
         /// Shape of the block.
         shape: &'static str,
-        /// [`WarpTransport::name`](crate::level::warp_transport::WarpTransport::name) of the operators that it asks for.
+        /// [`WarpTransport::name`](crate::level::warp_transport::WarpTransport::name) of the operators that it asks
+        /// for.
         transport: &'static str,
     },
-    /// [`AssembleConfig::max_depth`](crate::modular::assemble::config::AssembleConfig::max_depth) exceeds [`MAX_DEPTH`].
+    /// [`AssembleConfig::max_depth`](crate::modular::assemble::config::AssembleConfig::max_depth) exceeds
+    /// [`MAX_DEPTH`].
     #[error("light may cross {found} openings; expected at most {MAX_DEPTH}")]
     Depth {
         /// The depth given.
@@ -75,7 +77,8 @@ pub enum AssembleError {
         /// Bytes that the scene takes at least.
         found: usize,
     },
-    /// The up directions of two joined openings are turned or mirrored against each other in a way that the dictionary does not support.
+    /// The up directions of two joined openings are turned or mirrored against each other in a way that the dictionary
+    /// does not support.
     #[error(
         "face {face} of block {block} meets face {other_face} of block {other} with its up direction \
          towards {found}; expected +y, or -y where neither is a hole (turn one block, or use a dictionary with \

@@ -121,7 +121,8 @@ fn crossing(
     let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
     let keeps_up = match up {
         Some(Face::PosY) => true,
-        // Half a turn is a product of two mirrors; dictionaries of version 1 do not have the parities of modes under both.
+        // Half a turn is a product of two mirrors; dictionaries of version 1 do not have the parities of modes under
+        // both.
         Some(Face::NegY) => !has_hole && dictionary.knows_parities(),
         _ => dictionary.has_exchanges() && !has_hole,
     };
@@ -142,8 +143,8 @@ fn crossing(
     }
 }
 
-/// Where +x, +y and +z of the canonical cube there point in the canonical cube here, read off the corners that meet in the
-/// joined faces. `None` for an axis that has no single direction.
+/// Where +x, +y and +z of the canonical cube there point in the canonical cube here, read off the corners that meet in
+/// the joined faces. `None` for an axis that has no single direction.
 fn images_of_axes(
     (warp_here, face_here): (&Hexahedron, Face),
     (warp_there, face_there): (&Hexahedron, Face),
@@ -171,13 +172,14 @@ fn images_of_axes(
     images
 }
 
-/// The rotation from canonical axes to world axes: the orthogonal matrix nearest to the derivative of the warp at its middle, by Newton's
-/// iteration for the polar decomposition (Higham 1986).
+/// The rotation from canonical axes to world axes: the orthogonal matrix nearest to the derivative of the warp at its
+/// middle, by Newton's iteration for the polar decomposition (Higham 1986).
 fn rotation_of(warp: &Hexahedron) -> DMat3 {
     rotation_part(&warp.jacobian(DVec3::splat(0.5)), POLAR_STEPS)
 }
 
-/// Steps of the polar decomposition: enough for warps that are stretched by 1e6, the most that the check of a level accepts.
+/// Steps of the polar decomposition: enough for warps that are stretched by 1e6, the most that the check of a level
+/// accepts.
 const POLAR_STEPS: usize = 40;
 
 fn rotation_matrix(rotation: CubeRotation) -> DMat3 {

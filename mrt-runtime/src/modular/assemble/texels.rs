@@ -13,8 +13,8 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::simd::WIDEST;
 use mrt_core::simd::rows::DOT_ROWS;
 
-/// Areas of the texels of a warped block, in units of the mean area of a texel in its openings, so that light that crosses an opening
-/// counts the same on both sides. Without openings, the unit is the mean area of all texels.
+/// Areas of the texels of a warped block, in units of the mean area of a texel in its openings, so that light that
+/// crosses an opening counts the same on both sides. Without openings, the unit is the mean area of all texels.
 fn warped_areas(block: &PlacedBlock, resolution: usize) -> Vec<f32> {
     let area = |face: Face, unit: DVec3| {
         let jacobian = block.warp.jacobian(unit);

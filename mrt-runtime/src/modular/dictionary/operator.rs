@@ -131,9 +131,9 @@ impl OperatorKind {
         }
     }
 
-    /// Which lines are modes and have a scale each: columns of bases, rows of operators that give coefficients. The emission of a shape
-    /// counts as a basis. With one scale for each emission mode instead, errors of strong modes would reach the weak ones, whose light
-    /// gets far: an error of light of 2.4 % instead of 0.05 %, in `int8`.
+    /// Which lines are modes and have a scale each: columns of bases, rows of operators that give coefficients. The
+    /// emission of a shape counts as a basis. With one scale for each emission mode instead, errors of strong modes
+    /// would reach the weak ones, whose light gets far: an error of light of 2.4 % instead of 0.05 %, in `int8`.
     pub const fn modes(self) -> ModeAxis {
         match self {
             OperatorKind::JointBasis
@@ -146,11 +146,11 @@ impl OperatorKind {
         }
     }
 
-    /// The number format of matrices of this kind in a dictionary with format `storage`: the same, except that small kinds with large
-    /// errors get a more exact one.
+    /// The number format of matrices of this kind in a dictionary with format `storage`: the same, except that small
+    /// kinds with large errors get a more exact one.
     ///
-    /// It was chosen by the error of light: relative L2 of indirect irradiance over a level, the worst of four light sets on four levels
-    /// (maze, corridor, cube, room) with one and with four bounces:
+    /// It was chosen by the error of light: relative L2 of indirect irradiance over a level, the worst of four light
+    /// sets on four levels (maze, corridor, cube, room) with one and with four bounces:
     ///
     /// | kind in this format, the rest `f32` | `f16`: mobile, standard | `int8`: mobile, standard | share of bytes |
     /// | --- | --- | --- | --- |
@@ -161,9 +161,10 @@ impl OperatorKind {
     /// | paths | 0.004 %, 0.006 % | 0.09 %, 0.09 % | 14 % |
     /// | all | 0.034 %, 0.029 % | 0.50 %, 0.49 % | |
     ///
-    /// The error of light should be at most 0.03 % with `f16` and 0.5 % with `int8`. Responses and emission have the fewest bytes for their
-    /// error, so they are stored one step more exactly. So are lightfields in `f16` dictionaries, since they are multiplied once for each
-    /// opening: with lightfields in `f16`, the error of the preset mobile is 0.03 %.
+    /// The error of light should be at most 0.03 % with `f16` and 0.5 % with `int8`. Responses and emission have the
+    /// fewest bytes for their error, so they are stored one step more exactly. So are lightfields in `f16`
+    /// dictionaries, since they are multiplied once for each opening: with lightfields in `f16`, the error of the
+    /// preset mobile is 0.03 %.
     pub const fn storage(self, storage: Storage) -> Storage {
         match (self, storage) {
             (

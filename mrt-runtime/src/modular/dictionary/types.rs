@@ -7,7 +7,8 @@ use crate::modular::path::Word;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::storage::StoredMatrix;
 
-/// A dictionary whose matrices are as a file stores them, and borrow the bytes of the file where their alignment allows.
+/// A dictionary whose matrices are as a file stores them, and borrow the bytes of the file where their alignment
+/// allows.
 pub type StoredDictionary<'a> = Dictionary<StoredMatrix<'a>>;
 
 /// Baked operators of a set of shapes.
@@ -38,8 +39,9 @@ pub struct Dictionary<M = Matrix<f32>> {
 pub struct Variant<M = Matrix<f32>> {
     /// How the operators were made.
     pub transport: WarpTransport,
-    /// The form that the operators were made for ([`form_of`](crate::level::warp_form::form_of)). Blocks of the same form share a variant
-    /// at every place, in every size and in every orientation. Probes have the axes of the canonical cube, whatever the warp.
+    /// The form that the operators were made for ([`form_of`](crate::level::warp_form::form_of)). Blocks of the same
+    /// form share a variant at every place, in every size and in every orientation. Probes have the axes of the
+    /// canonical cube, whatever the warp.
     pub corners: WarpForm,
     /// The operators. Emission and response modes are those of the dictionary.
     pub operators: ShapeOperators<M>,
@@ -52,29 +54,32 @@ pub struct ShapeOperators<M = Matrix<f32>> {
     pub shape: &'static Shape,
     /// `T_d->b`, modes x texels: coefficients b from outgoing radiosity.
     pub coefficients_from_direct: M,
-    /// The joint basis, texels x joint modes: indirect irradiance from joint coefficients. Its first columns are `U_b`, one for each
-    /// coefficient b; the other columns are further modes for light from other blocks.
+    /// The joint basis, texels x joint modes: indirect irradiance from joint coefficients. Its first columns are `U_b`,
+    /// one for each coefficient b; the other columns are further modes for light from other blocks.
     pub joint_basis: M,
-    /// The joint basis of probes, 9 probes³ x joint modes: for each probe, nine SH coefficients of incident radiance; probes with x fastest,
-    /// then y, then z.
+    /// The joint basis of probes, 9 probes³ x joint modes: for each probe, nine SH coefficients of incident radiance;
+    /// probes with x fastest, then y, then z.
     pub probe_basis: M,
-    /// The joint basis of vector irradiance, 4 texels x joint modes: for each texel, four OHLSH coefficients. No rows in dictionaries without
-    /// vector irradiance.
+    /// The joint basis of vector irradiance, 4 texels x joint modes: for each texel, four OHLSH coefficients. No rows
+    /// in dictionaries without vector irradiance.
     pub vector_basis: M,
     /// Operators of each opening, in the order of [`Shape::openings`].
     pub openings: Vec<OpeningOperators<M>>,
-    /// `L_imp`, texels x modes: for each mode, the radiosity whose indirect light is the column of `U_b`. No rows in packed dictionaries.
+    /// `L_imp`, texels x modes: for each mode, the radiosity whose indirect light is the column of `U_b`. No rows in
+    /// packed dictionaries.
     pub implicit_lighting: M,
     /// Singular values of the modes, largest first.
     pub singular_values: Vec<f32>,
-    /// Fraction of the energy of M that the modes drop. The first mode does not count: it is uniform light, and enrichment sets its size.
+    /// Fraction of the energy of M that the modes drop. The first mode does not count: it is uniform light, and
+    /// enrichment sets its size.
     pub dropped_energy: f32,
     /// Fraction of the energy of light from other blocks that the joint basis drops.
     pub joint_dropped_energy: f32,
 }
 
-/// Operators of one opening of a shape, in the frame of [`frame_of_heading`](crate::modular::path::frame_of_heading). A second element is
-/// the same operator in the frame with x and y exchanged; sets without vertical openings have only the first.
+/// Operators of one opening of a shape, in the frame of [`frame_of_heading`](crate::modular::path::frame_of_heading). A
+/// second element is the same operator in the frame with x and y exchanged; sets without vertical openings have only
+/// the first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpeningOperators<M = Matrix<f32>> {
     /// Emission modes x modes: light that leaves through the opening.
@@ -97,8 +102,8 @@ pub struct LightfieldOperators<M = Matrix<f32>> {
     pub left: M,
     /// Modes x modes: the same lightfield with x and y exchanged. No rows in sets without vertical openings.
     pub exchange: M,
-    /// Modes x modes for each of [`Hole::ALL`](crate::level::shape::Hole::ALL): the lightfield that passes the hole. Empty in sets without
-    /// holes.
+    /// Modes x modes for each of [`Hole::ALL`](crate::level::shape::Hole::ALL): the lightfield that passes the hole.
+    /// Empty in sets without holes.
     pub holes: Vec<M>,
     /// `T_rlf->r`, response modes x lightfield modes.
     pub response_from_lightfield: M,
@@ -117,7 +122,8 @@ pub struct PathTable<M = Matrix<f32>> {
     pub depth: usize,
     /// Number of crossings of the longest words with a hole in the baked table.
     pub hole_depth: usize,
-    /// Entries in ascending order of words, each word once. Packed dictionaries lack the words that their level does not use.
+    /// Entries in ascending order of words, each word once. Packed dictionaries lack the words that their level does
+    /// not use.
     pub entries: Vec<PathEntry<M>>,
     /// Fraction of the energy of light that shapes send through their openings that the emission modes drop.
     pub emission_dropped_energy: f32,
@@ -137,9 +143,10 @@ pub struct PathEntry<M = Matrix<f32>> {
 /// Bases in texel space, for tools that make variants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sources<M = Matrix<f32>> {
-    /// Emission modes x texels of the canonical emitter (the cube that is open at +z): emission coefficients from radiosity.
+    /// Emission modes x texels of the canonical emitter (the cube that is open at +z): emission coefficients from
+    /// radiosity.
     pub emission_from_radiosity: M,
-    /// Response modes in columns. Rows are the texels of the canonical receiver (the cube that is open at -z), then nine SH coefficients
-    /// for each of its probes.
+    /// Response modes in columns. Rows are the texels of the canonical receiver (the cube that is open at -z), then
+    /// nine SH coefficients for each of its probes.
     pub response_basis: M,
 }

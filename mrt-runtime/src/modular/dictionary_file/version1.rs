@@ -1,9 +1,9 @@
 //! Reads dictionary files of version 1, whose operators are those of the paper.
 //!
-//! Version 1 has no path table, and one response basis for all openings instead of a joint basis for each shape. It becomes a special case
-//! of version 2. Lightfield modes serve as emission modes, and `R_b->rlf` as emission. The columns of a joint basis are those of `U_b`,
-//! then, for each opening, those of `U_r` turned to the walls behind that opening; each response is a joint coefficient. Scenes are
-//! lit by lightfields, with the products of version 1.
+//! Version 1 has no path table, and one response basis for all openings instead of a joint basis for each shape. It
+//! becomes a special case of version 2. Lightfield modes serve as emission modes, and `R_b->rlf` as emission. The
+//! columns of a joint basis are those of `U_b`, then, for each opening, those of `U_r` turned to the walls behind that
+//! opening; each response is a joint coefficient. Scenes are lit by lightfields, with the products of version 1.
 //!
 //! Sections: `preset`, `settings`, `sizes` (resolution, shapes, lightfield modes, response modes), `left`,
 //! `straight`, `right`, `T_rlf_r`, `U_r` (on the five walls of the cube open at -z), `dropped` (of lightfield and
@@ -241,8 +241,8 @@ fn opens_sideways(shape: &Shape) -> bool {
     openings.all(|opening| opening.outline == Outline::Whole && opening.face.axis() != 1)
 }
 
-/// For each texel of a shape, its row of `U_r` for light that enters by a face. The rows of `U_r` are texels of the cube that is open at
-/// -z, which is turned about +Y.
+/// For each texel of a shape, its row of `U_r` for light that enters by a face. The rows of `U_r` are texels of the
+/// cube that is open at -z, which is turned about +Y.
 fn receiver_texels(shape: &Shape, entered: Face, resolution: usize) -> Vec<usize> {
     let canonical: CubeSymmetry = frame_of_heading(entered.opposite()).inverse();
     shape

@@ -10,11 +10,12 @@ use mrt_core::container::{ContainerError, Writer};
 use mrt_core::storage::write_stored;
 
 impl<M: OperatorMatrix> Dictionary<M> {
-    /// The bytes of a dictionary file, with matrices in their present number formats. The same dictionary gives the same bytes.
+    /// The bytes of a dictionary file, with matrices in their present number formats. The same dictionary gives the
+    /// same bytes.
     ///
     /// # Errors
-    /// [`DictionaryError::Container`], if there are more matrices than a container can hold; [`DictionaryError::Size`], if there are more
-    /// than [`MAX_VARIANTS`] variants.
+    /// [`DictionaryError::Container`], if there are more matrices than a container can hold; [`DictionaryError::Size`],
+    /// if there are more than [`MAX_VARIANTS`] variants.
     ///
     /// # Panics
     /// If an element is infinite or NaN.

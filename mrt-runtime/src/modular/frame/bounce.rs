@@ -30,7 +30,8 @@ pub(super) struct BounceStage<'a> {
 struct Pass {
     /// Whether walls reflect indirect light too, not only direct light.
     reflects_indirect: bool,
-    /// Whether the pass continues the previous frame: light that hardly changes may be kept, and blocks may wait for a later frame.
+    /// Whether the pass continues the previous frame: light that hardly changes may be kept, and blocks may wait for a
+    /// later frame.
     goes_on: bool,
 }
 
@@ -108,8 +109,8 @@ impl BounceStage<'_> {
         }
     }
 
-    /// Computes one bounce of the light that walls reflect and emit. Returns the largest change of irradiance divided by the largest
-    /// irradiance: 1 for a pass that starts from darkness, 0 without light.
+    /// Computes one bounce of the light that walls reflect and emit. Returns the largest change of irradiance divided
+    /// by the largest irradiance: 1 for a pass that starts from darkness, 0 without light.
     fn pass(&mut self, pass: Pass) -> f32 {
         let all = std::mem::take(&mut self.schedule.all_stale);
         let tolerance = if pass.goes_on {
@@ -205,7 +206,8 @@ impl BounceStage<'_> {
         run_parts(executor, parts, |part| level.run(part));
     }
 
-    /// Computes joint coefficients of the targets. A block whose light would change by at most `keep_within`, W/m², keeps its old ones.
+    /// Computes joint coefficients of the targets. A block whose light would change by at most `keep_within`, W/m²,
+    /// keeps its old ones.
     fn update_responses(&mut self, keep_within: Option<f32>) {
         let executor = &*self.config.executor;
         let level = self.config.simd;

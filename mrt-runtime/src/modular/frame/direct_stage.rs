@@ -17,9 +17,9 @@ use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// A frame has room for `BEAMS_PER_BLOCK` beams for each block and [`SPARE_BEAMS`] more, up to [`MAX_BEAMS`]. A light has about one
-/// beam in each block that it reaches in a maze, and twelve in an open hall of 30 x 30 blocks. If the lights of a frame have more
-/// beams than fit, every texel tests each light: the same result, more slowly.
+/// A frame has room for `BEAMS_PER_BLOCK` beams for each block and [`SPARE_BEAMS`] more, up to [`MAX_BEAMS`]. A light
+/// has about one beam in each block that it reaches in a maze, and twelve in an open hall of 30 x 30 blocks. If the
+/// lights of a frame have more beams than fit, every texel tests each light: the same result, more slowly.
 const BEAMS_PER_BLOCK: usize = 12;
 /// See [`BEAMS_PER_BLOCK`].
 const SPARE_BEAMS: usize = 256;
@@ -117,8 +117,8 @@ impl DirectStage {
         self.source = Source::Nowhere;
     }
 
-    /// Traces the lights that changed, and makes the blocks wait that such a light reaches or reached before. Beams of unchanged
-    /// lights are kept if `keep`; otherwise all lights are traced.
+    /// Traces the lights that changed, and makes the blocks wait that such a light reaches or reached before. Beams of
+    /// unchanged lights are kept if `keep`; otherwise all lights are traced.
     fn trace(&mut self, scene: &SceneData, next: &[PlacedLight], doors: &[f32], keep: bool) {
         self.next_beams.clear();
         self.next_beams_of.clear();

@@ -4,24 +4,25 @@ use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::schedule::Schedule;
 use crate::modular::scene::SceneData;
 
-/// More flux than left the walls may arrive, by this share of reflected direct light and emission. Irradiance is sampled at texel
-/// centres, and the mean of the samples differs from the mean over the wall where light comes from nearby: by 0.1 % for even light
-/// at 3² texels. Without this margin, exact operators would be scaled, and the light of several lamps would not add up.
+/// More flux than left the walls may arrive, by this share of reflected direct light and emission. Irradiance is
+/// sampled at texel centres, and the mean of the samples differs from the mean over the wall where light comes from
+/// nearby: by 0.1 % for even light at 3² texels. Without this margin, exact operators would be scaled, and the light of
+/// several lamps would not add up.
 const SPOT_GAIN: f64 = 0.05;
 
-/// While blocks wait, this many times the most flux that left the walls may arrive: a lamp that moved lights its old and its new
-/// place until both are up to date.
+/// While blocks wait, this many times the most flux that left the walls may arrive: a lamp that moved lights its old
+/// and its new place until both are up to date.
 const WAITING_GAIN: f64 = 2.0;
 
 /// Scales a channel down if more flux arrives on all walls than left them. Returns how many channels were scaled.
 ///
-/// Exact transport never needs it. With truncated operators, bounces could grow without end; with the limit, the flux of indirect
-/// light falls by the largest albedo at each bounce, in every level. Direct light and emission have a margin of [`SPOT_GAIN`].
-/// Areas are those of the canonical blocks.
+/// Exact transport never needs it. With truncated operators, bounces could grow without end; with the limit, the flux
+/// of indirect light falls by the largest albedo at each bounce, in every level. Direct light and emission have a
+/// margin of [`SPOT_GAIN`]. Areas are those of the canonical blocks.
 ///
-/// While blocks wait for their light ([`FrameConfig::slice`](crate::modular::frame::config::FrameConfig::slice)), some of the flux
-/// that arrived is from earlier frames, and may rightly exceed the flux that leaves now. The limit is then [`WAITING_GAIN`] times
-/// the most flux that left the walls since no block waited.
+/// While blocks wait for their light ([`FrameConfig::slice`](crate::modular::frame::config::FrameConfig::slice)), some
+/// of the flux that arrived is from earlier frames, and may rightly exceed the flux that leaves now. The limit is then
+/// [`WAITING_GAIN`] times the most flux that left the walls since no block waited.
 pub(super) fn limit_flux(
     scene: &SceneData,
     blocks: &mut Schedule,

@@ -6,7 +6,8 @@ use crate::light::placed::{PlacedLight, place};
 use crate::light::source::{Light, LightError};
 use std::fmt;
 
-/// Names a light of a frame until the light is removed; afterwards it names no light. Other frames have ids of their own.
+/// Names a light of a frame until the light is removed; afterwards it names no light. Other frames have ids of their
+/// own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LightId {
     slot: u32,
@@ -100,8 +101,8 @@ impl LightList {
         exists
     }
 
-    /// Removes a light and returns it; `None` if it was removed before. If a light is skipped because there were too many, it
-    /// takes the place that gets free.
+    /// Removes a light and returns it; `None` if it was removed before. If a light is skipped because there were too
+    /// many, it takes the place that gets free.
     pub(super) fn remove(&mut self, level: &PlacedLevel, id: LightId) -> Option<Light> {
         let light = self.get(id)?;
         self.clear(level, id.slot);

@@ -17,9 +17,11 @@ pub struct FrameWork {
     /// Blocks whose indirect light was computed.
     pub targets: usize,
     /// Blocks that changed light was sent to, but whose own light would change by no more than
-    /// [`FrameConfig::tolerance`](crate::modular::frame::config::FrameConfig::tolerance), and therefore stayed the same.
+    /// [`FrameConfig::tolerance`](crate::modular::frame::config::FrameConfig::tolerance), and therefore stayed the
+    /// same.
     pub kept: usize,
-    /// Colour channels that were scaled down because more light arrived than left. The next pass then computes all blocks again.
+    /// Colour channels that were scaled down because more light arrived than left. The next pass then computes all
+    /// blocks again.
     pub limited: usize,
 }
 
@@ -49,7 +51,8 @@ impl FrameReport {
         &self.0.blocks
     }
 
-    /// Tiles of the lightmap that were written, in ascending order; all other tiles are unchanged. Empty without a lightmap.
+    /// Tiles of the lightmap that were written, in ascending order; all other tiles are unchanged. Empty without a
+    /// lightmap.
     pub fn changed_tiles(&self) -> impl ExactSizeIterator<Item = Tile> + '_ {
         let (columns, size) = (self.0.columns.max(1), self.0.tile_size);
         let tiles = self.0.tiles.iter();

@@ -1,5 +1,5 @@
-//! Which blocks a frame works on. Every step goes over a list of the blocks that matter to it; none looks at all blocks unless at
-//! least an eighth of them must be computed.
+//! Which blocks a frame works on. Every step goes over a list of the blocks that matter to it; none looks at all blocks
+//! unless at least an eighth of them must be computed.
 
 use crate::modular::kernels::indirect::Arrived;
 use crate::modular::kernels::scratch::Flux;
@@ -161,8 +161,8 @@ impl Schedule {
         }
     }
 
-    /// Lists the blocks whose coefficients b must be computed: all blocks with light if `all`, otherwise those whose irradiance may
-    /// have changed by more than `tolerance`, W/m².
+    /// Lists the blocks whose coefficients b must be computed: all blocks with light if `all`, otherwise those whose
+    /// irradiance may have changed by more than `tolerance`, W/m².
     pub(super) fn take_sources(&mut self, all: bool, tolerance: f32) {
         self.alive.sort_unstable();
         self.sources.clear();

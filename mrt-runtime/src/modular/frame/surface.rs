@@ -122,8 +122,8 @@ fn write(scene: &SceneData, block: BlockIndex, values: &[Vec3], plane: &mut Plan
     rank
 }
 
-/// Slots of a block whose texel is on a wall, with the texel and its face. A texel on the plane of a mirror has several slots.
-/// Texels in holes are left out: they neither reflect nor emit.
+/// Slots of a block whose texel is on a wall, with the texel and its face. A texel on the plane of a mirror has several
+/// slots. Texels in holes are left out: they neither reflect nor emit.
 fn wall_slots(
     scene: &SceneData,
     rank: BlockRank,

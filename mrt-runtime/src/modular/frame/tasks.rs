@@ -1,5 +1,5 @@
-//! The stages of a pass over lists of blocks. A kernel is called once for each task, not for each block: a small block takes little
-//! more time than the call of a kernel.
+//! The stages of a pass over lists of blocks. A kernel is called once for each task, not for each block: a small block
+//! takes little more time than the call of a kernel.
 
 use crate::modular::frame::schedule::BlockState;
 use crate::modular::frame::surface::Surface;
@@ -65,7 +65,8 @@ impl Kernel for Senders<'_> {
     }
 }
 
-/// Computes joint coefficients of a list of blocks. Mutable slices hold all blocks from the first of the list to the last.
+/// Computes joint coefficients of a list of blocks. Mutable slices hold all blocks from the first of the list to the
+/// last.
 pub(super) struct Receivers<'a> {
     pub scene: &'a SceneData,
     pub list: &'a [BlockRank],
@@ -115,8 +116,8 @@ impl Kernel for Receivers<'_> {
             let now = &self.scratch.joint[..];
             let before = &*kept;
             let change = ChangeOf { shape, before, now }.run(l);
-            // Always store a block that becomes fully dark, even within tolerance. Rows beyond those of the shape still hold numbers of
-            // another block.
+            // Always store a block that becomes fully dark, even within tolerance. Rows beyond those of the shape still
+            // hold numbers of another block.
             let is_dark = |row: &[f32]| row[..shape.rows].iter().all(|&r| r == 0.0);
             let goes_dark = change > 0.0 && now.chunks_exact(self.scene.rows.count).all(is_dark);
             if change <= most && !goes_dark {

@@ -36,7 +36,8 @@ pub(crate) struct ChangeOf<'a> {
 }
 
 impl Kernel for ChangeOf<'_> {
-    /// An upper bound of the change of irradiance at every texel, and of every coefficient of probes and of vector irradiance.
+    /// An upper bound of the change of irradiance at every texel, and of every coefficient of probes and of vector
+    /// irradiance.
     type Output = f32;
 
     #[inline(always)]
@@ -158,12 +159,12 @@ fn arrive<L: Lanes, E: PackedNumber>(l: L, values: &[E], block: &mut ResponsesOf
     }
 }
 
-/// Whether to multiply all columns of these entries, though some may belong to dark blocks. Coefficients of dark blocks are zero, and
-/// if they are few, leaving them out takes longer.
+/// Whether to multiply all columns of these entries, though some may belong to dark blocks. Coefficients of dark blocks
+/// are zero, and if they are few, leaving them out takes longer.
 #[inline(always)]
 fn has_few_dark<L: Lanes>(entries: &[TransportEntry], has_coefficients: &[bool]) -> bool {
-    // A column takes 3 cycles with 8 or 16 lanes, 12 with 4. Runs of lit entries take some 50 cycles more for each tile, and their
-    // ends are mispredicted. Measured on x86-64 with a quarter of the blocks dark.
+    // A column takes 3 cycles with 8 or 16 lanes, 12 with 4. Runs of lit entries take some 50 cycles more for each
+    // tile, and their ends are mispredicted. Measured on x86-64 with a quarter of the blocks dark.
     let few = match L::N {
         1 => 0,
         4 => 8,
@@ -178,8 +179,8 @@ fn has_few_dark<L: Lanes>(entries: &[TransportEntry], has_coefficients: &[bool])
     dark <= few
 }
 
-/// Runs of entries whose sources have light. The columns and numbers of a run are contiguous, and one long product has fewer
-/// mispredicted branches than many short ones, which have two each.
+/// Runs of entries whose sources have light. The columns and numbers of a run are contiguous, and one long product has
+/// fewer mispredicted branches than many short ones, which have two each.
 struct LitRuns<'a> {
     entries: &'a [TransportEntry],
     has_coefficients: &'a [bool],

@@ -7,17 +7,17 @@ use mrt_core::linalg::matrix::Matrix;
 use mrt_core::simd::{Aligned, WIDEST};
 use std::cmp::Reverse;
 
-/// Numbers of a mode at mirrored texels count as equal if they differ by at most this share of the mode's largest number. Sums in
-/// `f32` lose far more.
+/// Numbers of a mode at mirrored texels count as equal if they differ by at most this share of the mode's largest
+/// number. Sums in `f32` lose far more.
 const SYMMETRY_TOLERANCE: f32 = 1e-6;
 
-/// The slots of a shape's texels. Mirrors generate a group, and the group divides the texels into orbits: the slot of a texel is
-/// `element * stride + orbit`.
+/// The slots of a shape's texels. Mirrors generate a group, and the group divides the texels into orbits: the slot of a
+/// texel is `element * stride + orbit`.
 ///
-/// Bit k of an element is set if mirror k was applied. Each mode is even or odd under each mirror; bit k of its class is set if it is
-/// odd under mirror k. So a sum over an orbit splits into one sum for each class, and a mode needs a number for only one texel of
-/// each orbit. A texel on the plane of a mirror has two slots with the same content. Some mirrors are left out where orbits would be
-/// so few that most of them are padding.
+/// Bit k of an element is set if mirror k was applied. Each mode is even or odd under each mirror; bit k of its class
+/// is set if it is odd under mirror k. So a sum over an orbit splits into one sum for each class, and a mode needs a
+/// number for only one texel of each orbit. A texel on the plane of a mirror has two slots with the same content. Some
+/// mirrors are left out where orbits would be so few that most of them are padding.
 #[derive(Clone, Debug)]
 pub struct Folding {
     /// Number of mirrors in use, 0 to 3.
@@ -30,15 +30,16 @@ pub struct Folding {
     pub slot_of_texel: Vec<u32>,
     /// By slot: its texel; `u32::MAX` for a slot without a texel.
     pub texel_of_slot: Vec<u32>,
-    /// By orbit: number of its texels divided by the number of its slots, since sums over slots count a texel on the plane of a mirror
-    /// twice.
+    /// By orbit: number of its texels divided by the number of its slots, since sums over slots count a texel on the
+    /// plane of a mirror twice.
     pub multiplicity: Aligned<f32>,
     /// By orbit: multiplicity times the area of its texels, in areas of a cube's texel.
     pub weight: Aligned<f32>,
 }
 
-/// Time of all work on a slot besides products (sums and differences in both directions, loads and stores), in multiply-adds. Measured
-/// on x86-64: with 6 instead of 10, only the choice for straight blocks at 6² texels differs, and is slower.
+/// Time of all work on a slot besides products (sums and differences in both directions, loads and stores), in
+/// multiply-adds. Measured on x86-64: with 6 instead of 10, only the choice for straight blocks at 6² texels differs,
+/// and is slower.
 const SLOT_COST: usize = 10;
 
 /// A mirror under which a shape is symmetric, and its operators are even or odd.
@@ -92,7 +93,8 @@ pub(crate) struct Classes {
 }
 
 impl Folding {
-    /// Folds by the mirrors of a shape and its operators: `coefficients` is modes x texels, `joint` is texels x joint modes.
+    /// Folds by the mirrors of a shape and its operators: `coefficients` is modes x texels, `joint` is texels x joint
+    /// modes.
     pub(crate) fn new(
         shape: &Shape,
         resolution: usize,

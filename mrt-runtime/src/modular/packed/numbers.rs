@@ -66,8 +66,8 @@ impl PackedNumbers {
         }
     }
 
-    /// The scale for numbers of magnitude up to `largest`: 1 for `f32`; for `f16`, a power of two that keeps them well above subnormal
-    /// numbers; `largest` / 127 for `int8`.
+    /// The scale for numbers of magnitude up to `largest`: 1 for `f32`; for `f16`, a power of two that keeps them well
+    /// above subnormal numbers; `largest` / 127 for `int8`.
     pub(crate) fn scale(storage: Storage, largest: f32) -> f32 {
         // Even the brightest light that frames accept is nothing when multiplied by such a number.
         if largest < 1e-30 {

@@ -20,11 +20,11 @@ pub struct PackedShape {
     pub modes: usize,
     /// Number of joint modes.
     pub joint_modes: usize,
-    /// Number of rows of coefficients in each channel: joint modes and padding. A coefficient b is in the row of its joint mode; the other
-    /// rows of coefficients b are zero.
+    /// Number of rows of coefficients in each channel: joint modes and padding. A coefficient b is in the row of its
+    /// joint mode; the other rows of coefficients b are zero.
     ///
-    /// Modes of one class have neighbouring rows. Light that goes from block to block keeps its parity under the mirrors that the blocks
-    /// share, so half of the columns of a tile, or more, are zero and left out.
+    /// Modes of one class have neighbouring rows. Light that goes from block to block keeps its parity under the
+    /// mirrors that the blocks share, so half of the columns of a tile, or more, are zero and left out.
     pub rows: usize,
     /// By joint mode: its row. The first joint modes belong to coefficients b.
     pub(crate) row_of_mode: Vec<u16>,
@@ -41,8 +41,8 @@ pub struct PackedShape {
     pub(crate) joint_scales: Vec<f32>,
     /// Tiles that cover all rows.
     pub(crate) row_tiles: Vec<RowTile>,
-    /// By joint mode: a power of two near the norm of its light. Transport is stored in these units, so that strong modes do not use up
-    /// the digits of weak ones.
+    /// By joint mode: a power of two near the norm of its light. Transport is stored in these units, so that strong
+    /// modes do not use up the digits of weak ones.
     pub(crate) units: Vec<f32>,
     /// By row: 1 / the unit of its mode; 0 for padding.
     pub(crate) row_inverses: Aligned<f32>,
@@ -282,8 +282,8 @@ impl RowOrder {
             classes: vec![0..0; folding.elements()],
             tiles: Vec::new(),
         };
-        // Most levels are flat, and blocks on one floor share the mirror that exchanges floor and ceiling. So a tile has only modes that
-        // are even under that mirror, or only odd ones.
+        // Most levels are flat, and blocks on one floor share the mirror that exchanges floor and ceiling. So a tile
+        // has only modes that are even under that mirror, or only odd ones.
         let is_odd = |class: usize| folding.up_mirror.is_some_and(|k| class >> k & 1 == 1);
         for odd in [false, true] {
             for class in (0..folding.elements()).filter(|&class| is_odd(class) == odd) {
@@ -413,8 +413,8 @@ fn are_mixed(rows: &[GroupRow]) -> bool {
     !rows.windows(2).all(|pair| pair[0].is_followed_by(&pair[1]))
 }
 
-/// The rows of coefficients b in groups of up to [`DOT_ROWS`]. Groups of one class come first, in ascending order: kernels write
-/// zeros to the rows after a group that is not full, and those rows get their values from later groups.
+/// The rows of coefficients b in groups of up to [`DOT_ROWS`]. Groups of one class come first, in ascending order:
+/// kernels write zeros to the rows after a group that is not full, and those rows get their values from later groups.
 fn grouped_rows(order: &RowOrder, classes: &Classes, modes: usize) -> Vec<Vec<GroupRow>> {
     let rows = (0u16..).zip(&order.mode_of_row);
     let own: Vec<GroupRow> = rows

@@ -8,8 +8,8 @@ use mrt_core::simd::tiles::ColumnLists;
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
-/// The operator from the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are in the order of
-/// [`TexelLayout`].
+/// The operator from the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are in the order
+/// of [`TexelLayout`].
 #[derive(Clone, Debug, Default)]
 pub struct PackedTransport {
     /// By rank: the tiles of the block.
@@ -108,11 +108,11 @@ impl<'a> TransportPacker<'a> {
         size_of_val(self.values.as_slice()) + size_of_val(self.columns.as_slice())
     }
 
-    /// Adds the operator, joint modes x modes, of light from `source` to `target` that passes `doors`. Call it at most once for each pair
-    /// and set of doors.
+    /// Adds the operator, joint modes x modes, of light from `source` to `target` that passes `doors`. Call it at most
+    /// once for each pair and set of doors.
     ///
-    /// The weakest columns of tiles are left out, up to a share `negligible` of the pair's light in L2. A column's light is the light on
-    /// the receiving walls from unit light on the sending walls.
+    /// The weakest columns of tiles are left out, up to a share `negligible` of the pair's light in L2. A column's
+    /// light is the light on the receiving walls from unit light on the sending walls.
     pub(crate) fn add(
         &mut self,
         doors: &[u32],
@@ -255,8 +255,8 @@ impl<'a> TransportPacker<'a> {
         &self.values[entry.start..][..entry.columns.len() * rows]
     }
 
-    /// Kernels of 8 and 16 lanes take columns in pairs. If the entries of a tile that pass no gate have an odd number of columns,
-    /// the last entry gets a column of zeros.
+    /// Kernels of 8 and 16 lanes take columns in pairs. If the entries of a tile that pass no gate have an odd number
+    /// of columns, the last entry gets a column of zeros.
     fn pad_to_pairs(
         &self,
         open: &[Pending],
@@ -302,7 +302,8 @@ struct TileColumn {
     column: u16,
 }
 
-/// The columns of all tiles of an operator. Energy is that of the light on the receiving walls of unit light on the sending ones.
+/// The columns of all tiles of an operator. Energy is that of the light on the receiving walls of unit light on the
+/// sending ones.
 fn tile_columns(to: &PackedShape, from: &PackedShape, operator: &Matrix<f32>) -> Vec<TileColumn> {
     let mut parts = Vec::new();
     for (tile, rows) in (0u32..).zip(&to.row_tiles) {
@@ -323,8 +324,8 @@ fn tile_columns(to: &PackedShape, from: &PackedShape, operator: &Matrix<f32>) ->
     parts
 }
 
-/// The parts, as (tile, column) in ascending order, that remain when the weakest are left out, up to a `share` of the light in L2.
-/// None if there is no light at all.
+/// The parts, as (tile, column) in ascending order, that remain when the weakest are left out, up to a `share` of the
+/// light in L2. None if there is no light at all.
 fn strongest(mut parts: Vec<TileColumn>, share: f64) -> Vec<(u32, u16)> {
     let total: f64 = parts.iter().map(|part| part.energy).sum();
     if total == 0.0 {
@@ -372,13 +373,14 @@ impl PackedTransport {
             + size_of_val(self.reached.as_slice())
     }
 
-    /// Multiply-adds of one product of three channels: with the columns that are kept, padding included; and with dense operators of all
-    /// pairs.
+    /// Multiply-adds of one product of three channels: with the columns that are kept, padding included; and with dense
+    /// operators of all pairs.
     pub fn multiply_adds(&self) -> [usize; 2] {
         [self.multiply_adds, self.dense_multiply_adds]
     }
 
-    /// Multiply-adds of one product of three channels with the columns that are kept, if only blocks with `is_lit[rank]` have light.
+    /// Multiply-adds of one product of three channels with the columns that are kept, if only blocks with
+    /// `is_lit[rank]` have light.
     ///
     /// # Panics
     /// If there are fewer flags than blocks.

@@ -1,7 +1,8 @@
-//! Transport by lightfields that are passed on from opening to opening, as in the paper (Loos et al. 2011, section 6.3).
+//! Transport by lightfields that are passed on from opening to opening, as in the paper (Loos et al. 2011, section
+//! 6.3).
 //!
-//! Open rooms have binomially many sequences of openings. So sequences that reach an opening with the same set of headings are summed
-//! before they go on.
+//! Open rooms have binomially many sequences of openings. So sequences that reach an opening with the same set of
+//! headings are summed before they go on.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::Beyond;
@@ -30,7 +31,8 @@ struct WaveKey {
     entered: Face,
     /// Headings so far, as bits of [`Face::index`] in the source's frame.
     headings: u8,
-    /// From the canonical interface to the source's directions. It has no mirrors, so that light of mirrored paths is summed.
+    /// From the canonical interface to the source's directions. It has no mirrors, so that light of mirrored paths is
+    /// summed.
     frame: CubeSymmetry,
     /// Directions of +x and +y of the entered block in the source's frame.
     turn: [Face; 2],
@@ -147,8 +149,8 @@ impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
     }
 }
 
-/// Passes a lightfield through a cube, from the opening that it entered by to the opening towards `heading`. Returns the new frame and
-/// lightfield.
+/// Passes a lightfield through a cube, from the opening that it entered by to the opening towards `heading`. Returns
+/// the new frame and lightfield.
 fn through(
     fields: &LightfieldOperators,
     frame: CubeSymmetry,

@@ -1,7 +1,7 @@
 //! Transport by whole paths: a lookup and a sum for each sequence of openings.
 //!
-//! Every path from an opening is followed as long as its word is in the table. An open room has binomially many paths; that limits the
-//! depth of a table. In a level, each path only costs the addition of one small matrix.
+//! Every path from an opening is followed as long as its word is in the table. An open room has binomially many paths;
+//! that limits the depth of a table. In a level, each path only costs the addition of one small matrix.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedBlock};
@@ -165,8 +165,8 @@ impl<M> Walk<'_, M> {
 }
 
 impl Path {
-    /// The heading, in the word, of a crossing with a heading in the source's frame. A heading that no crossing had before becomes
-    /// the word's x or y.
+    /// The heading, in the word, of a crossing with a heading in the source's frame. A heading that no crossing had
+    /// before becomes the word's x or y.
     fn letter(&mut self, heading: Face, first: Face) -> Face {
         if heading == first {
             Face::PosZ
@@ -288,7 +288,8 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     }
 }
 
-/// From the canonical frame of a path to the source's. Headings that the path does not use are those of the opening's reference frame.
+/// From the canonical frame of a path to the source's. Headings that the path does not use are those of the opening's
+/// reference frame.
 fn path_frame(first: Face, x: Option<Face>, y: Option<Face>) -> CubeSymmetry {
     let reference = frame_of_heading(first);
     let (side, up) = (reference.face(Face::PosX), reference.face(Face::PosY));

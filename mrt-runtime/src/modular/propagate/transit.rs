@@ -1,5 +1,5 @@
-//! Light that passes through a warped block on its way. Operators of paths are made of unit cubes; a factor corrects how much of the
-//! light that entered by one opening leaves through the next.
+//! Light that passes through a warped block on its way. Operators of paths are made of unit cubes; a factor corrects
+//! how much of the light that entered by one opening leaves through the next.
 //!
 //! For even light, the factor is exact. The distribution of light over the next opening stays that of the cube.
 
@@ -15,7 +15,8 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 /// Factors by the face that light enters by, then the face that it leaves by.
 type Factors = [[f32; 6]; 6];
 
-/// By shape of a scene: factors of blocks whose operators were made for their warp. Blocks with canonical operators count as cubes.
+/// By shape of a scene: factors of blocks whose operators were made for their warp. Blocks with canonical operators
+/// count as cubes.
 pub(crate) struct Transits(Vec<Option<Factors>>);
 
 impl Transits {
@@ -59,8 +60,8 @@ fn factors(block: &PlacedBlock) -> Factors {
     factors
 }
 
-/// Number of points along each axis of an opening at which form factors are averaged. With 24 instead, the factors of boxes up to 1:4
-/// change by less than 0.1 %.
+/// Number of points along each axis of an opening at which form factors are averaged. With 24 instead, the factors of
+/// boxes up to 1:4 change by less than 0.1 %.
 const POINTS: usize = 12;
 
 /// Mean form factor from one opening of a warped cube to another.
