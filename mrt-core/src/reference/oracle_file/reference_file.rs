@@ -57,7 +57,7 @@ pub struct ReferenceFile {
     pub terms: Vec<String>,
     /// Size of each dimension of `data`, slowest first.
     pub shape: Vec<usize>,
-    /// All numbers.
+    /// All numbers of the file.
     pub data: Vec<f32>,
 }
 
