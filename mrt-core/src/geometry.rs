@@ -3,7 +3,9 @@
 
 pub mod cube;
 pub mod cube_symmetry;
+pub mod texel_permutation;
 pub mod hexahedron;
+pub mod polar_decomposition;
 pub mod tube;
 pub mod form_factor;
 pub mod polygon_moments;

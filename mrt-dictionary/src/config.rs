@@ -1,7 +1,8 @@
 //! Settings of a bake and the named presets.
 
-use mrt_runtime::level::shape::{SHAPE_SETS, Shape, shape_set};
-use mrt_runtime::modular::dictionary_file::MAX_MODES;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::{SHAPE_SETS, shape_set};
+use mrt_runtime::low_level::modular::dictionary_file::MAX_MODES;
 
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]

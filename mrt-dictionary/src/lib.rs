@@ -5,4 +5,5 @@
 
 pub mod config;
 pub mod progress;
+pub mod parallel_products;
 pub mod modular;

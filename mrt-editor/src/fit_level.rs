@@ -18,8 +18,8 @@ use glam::Vec3;
 use grid_fit::JoinConfig;
 use grid_lines::LineConfig;
 use mrt_core::geometry::mesh::{TriangleMesh, bounds};
-use mrt_runtime::level::block::{Level, LevelError};
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::{Level, LevelError};
 use voxels::{FreeSpace, VoxelGrid, Winding, find_free_space};
 
 /// Points spread over the mesh to measure albedos and coverage.
@@ -280,7 +280,7 @@ fn from_level(level: Level) -> Mapped {
 }
 
 fn closed_shape() -> &'static Shape {
-    &mrt_runtime::level::shape::SHAPES[0]
+    &mrt_runtime::blocks::SHAPES[0]
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! The `mrt` tool.
 
 use clap::{Parser, Subcommand};
-use mrt_editor::cli::{accuracy, adapt, bake, bench, demo, figures, info, light, map, pack};
+use mrt_editor::cli::output::exit_code;
+use mrt_editor::cli::{accuracy, adapt, bake, demo, info, light, map, pack};
 use std::process::ExitCode;
 
 /// Dynamic indirect light from modular radiance transfer: bakes dictionaries of canonical shapes, maps
@@ -25,8 +26,6 @@ enum Command {
     Map(map::MapArgs),
     Light(light::LightArgs),
     Pack(pack::PackArgs),
-    Figures(figures::FiguresArgs),
-    Bench(bench::BenchArgs),
 }
 
 fn main() -> ExitCode {
@@ -42,14 +41,6 @@ fn main() -> ExitCode {
         Command::Map(args) => map::run(&args).map_err(Into::into),
         Command::Light(args) => light::run(&args).map_err(Into::into),
         Command::Pack(args) => pack::run(&args).map_err(Into::into),
-        Command::Figures(args) => figures::run(&args).map_err(Into::into),
-        Command::Bench(args) => bench::run(&args).map_err(Into::into),
     };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("mrt: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    exit_code(result)
 }

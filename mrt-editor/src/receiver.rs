@@ -16,7 +16,8 @@ use lookup::Lookup;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::tube::TubeForm;
-use mrt_runtime::level::block::{Block, Level};
+use mrt_runtime::Level;
+use mrt_runtime::blocks::Block;
 use trilinear::Trilinear;
 
 /// A point of a block's wall.

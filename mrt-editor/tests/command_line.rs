@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
 
-const COMMANDS: [&str; 10] = [
-    "demo", "bake", "adapt", "info", "accuracy", "map", "light", "pack", "figures", "bench",
+const COMMANDS: [&str; 8] = [
+    "demo", "bake", "adapt", "info", "accuracy", "map", "light", "pack",
 ];
 
 /// A room of 2 x 2 x 2 m, its faces turned inwards.

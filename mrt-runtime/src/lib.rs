@@ -1,47 +1,70 @@
-//! Modular Radiance Transfer at run time (Loos et al., "Modular Radiance Transfer", SIGGRAPH Asia
-//! 2011), in the order in which data flows.
+//! Dynamic indirect light for games: Modular Radiance Transfer at run time (Loos et al., "Modular Radiance Transfer",
+//! SIGGRAPH Asia 2011).
 //!
-//! A [`shape`](level::shape) is a cube with faces missing, and a [`dictionary`](modular::dictionary) holds the baked
-//! operators of shapes. A [`level`] places warped shapes and joins their openings; [`assemble`](modular::assemble) turns
-//! both into a [`scene`](modular::scene), which a game keeps. Every frame takes [`light`]s through
-//! [direct light](light::direct_light) and the reduced operators to indirect irradiance ([`frame`](modular::frame)) and
-//! copies it to a [lightmap](output::lightmap_atlas).
+//! A [`Dictionary`] holds the light transport of a few canonical shapes, computed once. A [`Level`] places warped copies
+//! of them and joins their openings. Both make a [`Scene`], which never changes and is cheap to share between threads. A
+//! [`Frame`] keeps a scene, takes [`Light`]s, and gives a [`Lightmap`] and the light at any point.
 //!
 //! ```
-//! use glam::{Vec3, vec3};
-//! use mrt_core::container::ByteBudget;
-//! use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-//! use mrt_runtime::modular::dictionary::Dictionary;
-//! use mrt_runtime::modular::frame::{Bounces, Frame};
-//! use mrt_runtime::level::text;
-//! use mrt_runtime::light::placed::Light;
-//! use mrt_runtime::light::visibility::Openings;
+//! use mrt_runtime::glam::{Vec3, vec3};
+//! use mrt_runtime::{AssembleConfig, Dictionary, Frame, FrameConfig, Level, Light, Scene};
 //!
-//! // Once: a dictionary, a level, the scene that both make, and the buffers of its frames.
-//! let bytes = include_bytes!("../../assets/cubes-2d-standard.mrt");
-//! let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20))?;
-//! let level = text::from_text(include_str!("../../assets/maze.level.toml"))?;
-//! let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
-//! let mut frame = Frame::new(&scene);
+//! // Once: a dictionary, a level, the scene that both make, and a frame of it.
+//! let dictionary = Dictionary::from_bytes(include_bytes!("../../assets/cubes-2d-standard.mrt"))?;
+//! let level = Level::from_text(include_str!("../../assets/maze.level.toml"))?;
+//! let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
+//! let mut frame = Frame::new(&scene, FrameConfig::default());
+//! let torch = frame.add_light(Light::sphere(vec3(0.5, 0.7, 0.5), 0.1, Vec3::splat(2.0)));
 //!
-//! // Every frame: lights in, irradiance out. Feedback adds a bounce a frame.
-//! let lamp = Light::Sphere {
-//!     position: vec3(0.5, 0.7, 0.5),
-//!     radius: 0.1,
-//!     intensity: Vec3::splat(2.0),
-//! };
-//! frame.solve(&scene, &[lamp], &Openings, Bounces::Feedback)?;
-//!
-//! // The lightmap goes to a texture; a wall of block 0 finds its place in it.
-//! let wall = scene.blocks[0].shape.walls().next().expect("every shape has walls");
-//! let uv = scene.atlas.texture_coordinate(0, wall, 0.5, 0.5).expect("a wall");
-//! assert_eq!(frame.lightmap().len(), scene.atlas.width * scene.atlas.height);
-//! assert!(uv.x < 1.0 && frame.indirect_at(&scene, 0, 0)[0] > 0.0);
+//! // Every frame: lights move, and the tiles of the lightmap that changed go to a texture. By default, each frame adds a
+//! // bounce to the light of the frame before.
+//! let mut staging = Vec::new();
+//! frame.set_light(torch, Light::sphere(vec3(0.5, 0.6, 0.5), 0.1, Vec3::splat(2.0)));
+//! let report = frame.solve();
+//! for tile in report.changed_tiles() {
+//!     frame.lightmap().write_rgba16f(tile, &mut staging);
+//! }
+//! assert!(report.skipped_lights().is_empty() && !staging.is_empty());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! Positions are in metres, axes right-handed with +Y up, colours linear RGB, irradiance in W/m², intensities in W/sr.
+//!
+//! Features: `text` (default) reads and writes levels as TOML; `timing` measures the stages of a frame; `rayon` brings an
+//! [`Executor`](executor::Executor) of its threads; `generator` makes mazes. Without any, the frame alone remains.
 
-pub mod level;
-pub mod light;
-pub mod output;
-pub mod modular;
+mod level;
+mod light;
+mod output;
+mod modular;
 pub mod executor;
+pub mod blocks;
+pub mod shadows;
+pub mod low_level;
+
+pub use glam;
+pub use level::block::Level;
+pub use level::block_index::BlockIndex;
+pub use level::error::LevelError;
+#[cfg(feature = "text")]
+pub use level::text::LevelTextError;
+pub use light::source::{Light, LightError};
+pub use modular::assemble::config::{AssembleConfig, Coupling};
+pub use modular::assemble::error::AssembleError;
+pub use modular::dictionary::types::Dictionary;
+pub use modular::dictionary_file::format::DictionaryError;
+pub use modular::frame::Frame;
+pub use modular::frame::config::{Bounces, FrameConfig, Outputs};
+pub use modular::frame::error::FrameError;
+pub use modular::frame::light_list::{LightId, SkippedLight};
+pub use modular::frame::report::FrameReport;
+#[cfg(feature = "timing")]
+pub use modular::frame::stage_clock::StageTimes;
+pub use modular::frame::surface::SurfaceError;
+pub use modular::scene::Scene;
+pub use mrt_core::simd::SimdLevel;
+pub use mrt_core::storage::Storage;
+pub use output::lightmap::Lightmap;
+pub use output::lightmap_atlas::Tile;
+pub use output::probe_order::ProbeOrder;
+pub use output::probes::Probes;

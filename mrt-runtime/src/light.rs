@@ -1,5 +1,7 @@
 //! Lights, their shadows, and direct light at texels.
 
+pub mod limits;
+pub mod source;
 pub mod placed;
 pub mod visibility;
 pub mod beam;

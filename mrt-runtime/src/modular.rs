@@ -7,6 +7,7 @@ pub mod packed;
 pub mod scene;
 pub mod assemble;
 pub mod pack;
-mod propagate;
 pub mod opening_responses;
 pub mod frame;
+mod propagate;
+mod kernels;

@@ -2,24 +2,19 @@
 //! Needs little, so that it can run under emulation too.
 
 use glam::{Vec3, vec3};
-use mrt_core::container::ByteBudget;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
-use mrt_runtime::level::block::Door;
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, Outputs};
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::blocks::{Door, maze};
+use mrt_runtime::{
+    AssembleConfig, Bounces, Dictionary, Frame, FrameConfig, Light, Outputs, ProbeOrder, Scene,
+};
 
 /// Share of the brightest texel by which levels may differ: sums of some hundred products in another order, in `f32`.
 const ROUNDING: f32 = 1e-5;
 
 fn dictionary() -> Dictionary {
     let bytes = include_bytes!("../../assets/versions/2.mrt");
-    Dictionary::from_bytes(bytes, &mut ByteBudget::new(64 << 20)).expect("sound")
+    Dictionary::from_bytes(bytes).expect("sound")
 }
 
 #[test]
@@ -39,18 +34,23 @@ fn every_level_gives_the_light_of_the_scalar_reference() {
             transport_storage: storage,
             ..AssembleConfig::default()
         };
-        let scene = assemble(&level, &dictionary, &config).expect("it fits");
+        let scene = Scene::assemble(&level, &dictionary, &config).expect("it fits");
         let lit = |simd: SimdLevel, bounces: Bounces| {
             let config = FrameConfig {
                 simd,
                 ..FrameConfig::default()
             };
-            let mut frame = Frame::with_config(&scene, config);
+            let mut frame = Frame::new(&scene, config);
+            frame.set_lights(&lights);
+            frame.set_bounces(bounces);
             for _ in 0..3 {
-                let solved = frame.solve(&scene, &lights, &Openings, bounces);
-                solved.expect("the lights are sound");
+                let report = frame.solve();
+                assert_eq!(report.skipped_lights(), [], "the lights are sound");
             }
-            [frame.direct(), frame.indirect()].concat()
+            let (mut direct, mut indirect) = (Vec::new(), Vec::new());
+            frame.copy_direct_to(&mut direct);
+            frame.copy_indirect_to(&mut indirect);
+            [direct, indirect].concat()
         };
         for bounces in [Bounces::Count(1), Bounces::Count(3), Bounces::Feedback] {
             let expected = lit(SimdLevel::Scalar, bounces);
@@ -108,7 +108,7 @@ fn hash_of(dictionary: &Dictionary, simd: SimdLevel) -> u64 {
             transport_storage: storage,
             ..AssembleConfig::default()
         };
-        let scene = assemble(&level, dictionary, &config).expect("it fits");
+        let scene = Scene::assemble(&level, dictionary, &config).expect("it fits");
         let config = FrameConfig {
             simd,
             outputs: Outputs {
@@ -117,16 +117,20 @@ fn hash_of(dictionary: &Dictionary, simd: SimdLevel) -> u64 {
             },
             ..FrameConfig::default()
         };
-        let mut frame = Frame::with_config(&scene, config);
+        let mut frame = Frame::new(&scene, config);
         // The caller's direct light, so that libraries' roots have no part in it.
         let light = |k: usize| ((k * 7919 + 13) % 2048) as f32 / 2048.0;
         let direct: Vec<f32> = (0..3 * scene.texel_count()).map(light).collect();
         for bounces in [Bounces::Count(1), Bounces::Feedback, Bounces::Count(4)] {
-            let solved = frame.solve_from_direct(&scene, &direct, bounces);
-            assert_eq!(solved, Ok(()));
-            sum = hash(sum, &frame.coefficients());
-            sum = hash(sum, &frame.indirect());
-            sum = hash(sum, frame.lightmap().as_flattened());
+            frame.set_bounces(bounces);
+            let solved = frame.solve_from_direct(&direct);
+            solved.expect("the direct light is sound");
+            let mut copy = Vec::new();
+            frame.copy_coefficients_to(&mut copy);
+            sum = hash(sum, &copy);
+            frame.copy_indirect_to(&mut copy);
+            sum = hash(sum, &copy);
+            sum = hash(sum, frame.lightmap().pixels().as_flattened());
             sum = hash(sum, frame.probes().expect("baked").values().as_flattened());
         }
     }

@@ -1,12 +1,16 @@
 //! Beams of direct light against the scalar walk, texel by texel.
 
+use crate::normal_of;
+use crate::position_of;
 use glam::{DVec3, Vec3};
 use mrt_core::simd::SimdLevel;
-use mrt_runtime::light::beam::{Beam, BeamTracer};
-use mrt_runtime::light::direct_light::{TexelPlanes, add_beam, add_exact, irradiance};
-use mrt_runtime::light::placed::{Light, PlacedLight, WALL_TOLERANCE, place};
-use mrt_runtime::light::visibility::{Openings, Receiver, Toward, Visibility};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::low_level::light::beam::{Beam, BeamTracer};
+use mrt_runtime::low_level::light::direct_light::add_beam::{TexelPlanes, add_beam};
+use mrt_runtime::low_level::light::direct_light::{Shadows, add_exact, irradiance};
+use mrt_runtime::low_level::light::placed::{PlacedLight, place};
+use mrt_runtime::shadows::{Openings, Receiver, Toward, Visibility};
+use mrt_runtime::{Light, Scene};
 
 /// Share of its own irradiance that a texel may differ by.
 const RELATIVE: f32 = 1e-5;
@@ -21,11 +25,19 @@ const ANGLE: f32 = 2e-6;
 const EDGE: f64 = 1e-5;
 
 /// The texels of a block, by slot.
-pub fn texels(scene: &Scene, block: usize) -> TexelPlanes<'_> {
-    let slots = scene.layout.slots[scene.layout.rank[block] as usize].clone();
+pub fn texels(scene: &Scene, block: BlockIndex) -> TexelPlanes<'_> {
+    let slots = scene.layout.slots(scene.layout.rank[block.get()]);
     TexelPlanes {
-        positions: scene.surface.positions().block(slots.clone()),
-        normals: scene.surface.normals().block(slots),
+        positions: scene.texels.positions.block(slots.clone()),
+        normals: scene.texels.normals.block(slots),
+    }
+}
+
+fn shadows<'a>(scene: &'a Scene, doors: &'a [f32]) -> Shadows<'a, Openings> {
+    Shadows {
+        level: &scene.level,
+        doors,
+        visibility: &Openings,
     }
 }
 
@@ -37,7 +49,7 @@ pub fn beams(
     doors: &[f32],
 ) -> Vec<Beam> {
     let mut beams: Vec<Beam> = Vec::new();
-    tracer.trace(scene, 7, light, doors, &mut |beam| {
+    tracer.trace(&scene.level, 7, light, doors, &mut |beam| {
         assert_eq!(beam.light, 7);
         let of_block = |b: &&Beam| b.block == beam.block;
         assert!(
@@ -62,13 +74,13 @@ fn lit(
 ) -> Vec<Vec3> {
     let mut out = vec![Vec3::ZERO; scene.texel_count()];
     for beam in beams {
-        let block = beam.block as usize;
-        let place = scene.layout.rank[block] as usize;
-        let of_block = texels(scene, block);
+        let of_block = texels(scene, beam.block);
+        let block = beam.block.get();
         let mut planes = [0, 1, 2].map(|_| vec![0.0; of_block.positions[0].len()]);
         let slices = planes.each_mut().map(|plane| &mut plane[..]);
         if beam.exact {
-            add_exact(scene, place, light, doors, slices);
+            let shadows = shadows(scene, doors);
+            add_exact(shadows, beam.block, &of_block, light, slices);
         } else {
             add_beam(level, &of_block, light, beam, slices);
         }
@@ -78,7 +90,7 @@ fn lit(
             let mut padding = slots.filter(|(_, texel)| **texel == u32::MAX);
             assert!(padding.all(|(&e, _)| e == 0.0), "padding");
         }
-        for (texel, &slot) in scene.blocks[block]
+        for (texel, &slot) in scene.level.blocks[block]
             .texels
             .clone()
             .zip(&folding.slot_of_texel)
@@ -109,9 +121,9 @@ pub struct Tally {
 
 /// Compares every texel, light and level with the reference.
 pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally) {
-    let mut tracer = BeamTracer::new(scene);
+    let mut tracer = BeamTracer::new(&scene.level);
     for &light in lights {
-        let placed = place(scene, 0, light).expect("a sound light");
+        let placed = place(&scene.level, light).expect("a sound light");
         let beams = beams(scene, &mut tracer, &placed, doors);
         tally.beams += beams.len();
         tally.exact += beams.iter().filter(|b| b.exact).count();
@@ -120,16 +132,16 @@ pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally
         let found: Vec<Vec<Vec3>> = SimdLevel::available()
             .map(|level| lit(level, scene, &placed, doors, &beams))
             .collect();
-        for (index, block) in scene.blocks.iter().enumerate() {
+        for (index, block) in scene.level.blocks.iter().enumerate() {
             for texel in block.texels.clone() {
-                let position = scene.texel_position(texel).as_dvec3();
-                let normal = scene.texel_normal(texel).as_dvec3();
+                let position = position_of(scene, texel).as_dvec3();
+                let normal = normal_of(scene, texel).as_dvec3();
                 let at = |position: DVec3, normal: DVec3| {
                     let receiver = Receiver {
-                        block: index,
+                        block: BlockIndex::new(index),
                         position,
                     };
-                    irradiance(scene, &placed, doors, receiver, normal, &Openings)
+                    irradiance(shadows(scene, doors), &placed, receiver, normal)
                 };
                 let expected = at(position, normal);
                 let to_light = match light {
@@ -169,7 +181,7 @@ pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally
                 let toward = match light {
                     Light::Sphere { position, .. } | Light::Spot { position, .. } => {
                         let position = position.as_dvec3();
-                        let block = scene.block_at(position, WALL_TOLERANCE);
+                        let block = scene.level.block_at(position);
                         Toward::Point {
                             position,
                             block: block.expect("placed"),
@@ -184,10 +196,10 @@ pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally
                         f64::from(k / 9 - 1),
                     );
                     let receiver = Receiver {
-                        block: index,
+                        block: BlockIndex::new(index),
                         position: position + offset * step,
                     };
-                    Openings.fraction(scene, doors, receiver, toward)
+                    Openings.fraction(&scene.level, doors, receiver, toward)
                 };
                 let flips = (1..27).any(|k| fraction(k) != fraction(0));
                 let values: Vec<Vec3> = found.iter().map(|f| f[texel]).collect();

@@ -9,14 +9,13 @@ use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::geometry::cube::Face;
 use mrt_core::reference::radiosity::{ExactScene, Side};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::FrameReport;
+use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
+use mrt_runtime::shadows::Openings;
+use mrt_runtime::shadows::Visibility;
+use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Level, Light, Scene};
 use std::sync::OnceLock;
 
 /// The committed default dictionary.
@@ -29,7 +28,7 @@ pub static DEFAULT_BYTES: &[u8] = include_bytes!(concat!(
 pub fn default_dictionary() -> &'static Dictionary {
     static DICTIONARY: OnceLock<Dictionary> = OnceLock::new();
     DICTIONARY.get_or_init(|| {
-        Dictionary::from_bytes(DEFAULT_BYTES, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
+        Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
             .expect("the committed dictionary is sound")
     })
 }
@@ -67,26 +66,97 @@ pub fn closed_floor_plans() -> Vec<(&'static str, Vec<[i32; 2]>)> {
 
 /// The level with the default dictionary and depth.
 pub fn assembled(level: &Level) -> Scene {
-    assemble(level, default_dictionary(), &AssembleConfig::default())
+    Scene::assemble(level, default_dictionary(), &AssembleConfig::default())
         .expect("the level fits the dictionary")
 }
 
 /// A sphere light.
 pub fn sphere(position: Vec3, radius: f32, intensity: Vec3) -> Light {
-    Light::Sphere {
-        position,
-        radius,
-        intensity,
+    Light::sphere(position, radius, intensity)
+}
+
+/// A new frame with the default outputs, solved with the openings' shadows.
+pub fn solved(scene: &Scene, lights: &[Light], bounces: Bounces) -> Frame {
+    let mut frame = Frame::new(scene, FrameConfig::default());
+    frame.light_with(lights, bounces);
+    frame
+}
+
+/// What tests ask of a frame, in one call.
+pub trait FrameForTests {
+    /// Solves for these lights alone, all of which must shine.
+    fn light_with(&mut self, lights: &[Light], bounces: Bounces) -> FrameReport {
+        self.light_through(lights, &Openings, bounces)
+    }
+
+    /// As [`FrameForTests::light_with`], with other shadows.
+    fn light_through(
+        &mut self,
+        lights: &[Light],
+        visibility: &impl Visibility,
+        bounces: Bounces,
+    ) -> FrameReport;
+
+    /// Solves for direct light that the test computed.
+    fn light_from(&mut self, direct: &[f32], bounces: Bounces) -> FrameReport;
+
+    /// A copy of the direct irradiance of all texels.
+    fn direct(&self) -> Vec<f32>;
+
+    /// A copy of the indirect irradiance of all texels.
+    fn indirect(&self) -> Vec<f32>;
+
+    /// A copy of the coefficients b of all blocks.
+    fn coefficients(&self) -> Vec<f32>;
+}
+
+impl FrameForTests for Frame {
+    fn light_through(
+        &mut self,
+        lights: &[Light],
+        visibility: &impl Visibility,
+        bounces: Bounces,
+    ) -> FrameReport {
+        self.set_lights(lights);
+        self.set_bounces(bounces);
+        let report = self.solve_with(visibility);
+        assert_eq!(report.skipped_lights(), [], "all lights shine");
+        report
+    }
+
+    fn light_from(&mut self, direct: &[f32], bounces: Bounces) -> FrameReport {
+        self.set_bounces(bounces);
+        self.solve_from_direct(direct)
+            .expect("the direct light is sound")
+    }
+
+    fn direct(&self) -> Vec<f32> {
+        let mut copy = Vec::new();
+        self.copy_direct_to(&mut copy);
+        copy
+    }
+
+    fn indirect(&self) -> Vec<f32> {
+        let mut copy = Vec::new();
+        self.copy_indirect_to(&mut copy);
+        copy
+    }
+
+    fn coefficients(&self) -> Vec<f32> {
+        let mut copy = Vec::new();
+        self.copy_coefficients_to(&mut copy);
+        copy
     }
 }
 
-/// A new frame, solved with the openings' shadows.
-pub fn solved(scene: &Scene, lights: &[Light], bounces: Bounces) -> Frame {
-    let mut frame = Frame::new(scene);
-    frame
-        .solve(scene, lights, &Openings, bounces)
-        .expect("the lights are sound");
-    frame
+/// World position, metres, of a texel counted over all blocks.
+pub fn position_of(scene: &Scene, texel: usize) -> Vec3 {
+    scene.texel_position(texel).expect("a texel of the scene")
+}
+
+/// Unit normal of a texel counted over all blocks.
+pub fn normal_of(scene: &Scene, texel: usize) -> Vec3 {
+    scene.texel_normal(texel).expect("a texel of the scene")
 }
 
 /// Many bounces, to where `f32` rounding hides the next one.
@@ -100,12 +170,13 @@ pub const CONVERGED: Bounces = Bounces::Converged {
 pub fn in_level_order(level: &Level, scene: &Scene, signal: &[f32]) -> Vec<[f32; 3]> {
     let mut out = Vec::with_capacity(signal.len() / 3);
     for (index, block) in level.blocks.iter().enumerate() {
-        let range = &scene.blocks[index].texels;
+        let range = &scene.level.blocks[index].texels;
         for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
-            for row in 0..scene.resolution {
-                for column in 0..scene.resolution {
+            for row in 0..scene.level.resolution {
+                for column in 0..scene.level.resolution {
                     let texel = scene
-                        .level_texel(index, face, row, column)
+                        .level
+                        .level_texel(BlockIndex::new(index), face, row, column)
                         .expect("walls have texels");
                     let start = 3 * range.start + texel;
                     out.push(std::array::from_fn(|c| signal[start + c * range.len()]));
@@ -119,6 +190,7 @@ pub fn in_level_order(level: &Level, scene: &Scene, signal: &[f32]) -> Vec<[f32;
 /// A signal of a frame in the order of the scene's texels, channels together.
 pub fn by_texel(scene: &Scene, signal: &[f32]) -> Vec<[f32; 3]> {
     scene
+        .level
         .blocks
         .iter()
         .flat_map(|block| {
@@ -142,9 +214,9 @@ pub fn largest_difference(ours: &[[f32; 3]], theirs: &[[f32; 3]]) -> f64 {
 
 /// Area of every texel, m², by the scene's order.
 pub fn texel_areas(scene: &Scene) -> Vec<f64> {
-    let resolution = scene.resolution;
+    let resolution = scene.level.resolution;
     let mut areas = Vec::with_capacity(scene.texel_count());
-    for block in &scene.blocks {
+    for block in &scene.level.blocks {
         for (face, center) in block.shape.texels(resolution) {
             let half = 0.5 / resolution as f64;
             let mut along = [DVec3::ZERO; 2];

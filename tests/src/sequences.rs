@@ -1,5 +1,6 @@
 //! Random levels, lights and sequences of frames, from seeds.
 
+use crate::FrameForTests;
 use crate::{Random, random_cells};
 use glam::{DVec3, Vec3};
 use mrt_core::container::ByteBudget;
@@ -7,12 +8,8 @@ use mrt_core::storage::Storage;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::{Door, Level};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::Frame;
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::blocks::Door;
+use mrt_runtime::{AssembleConfig, Dictionary, Frame, Level, Light, Scene};
 use std::sync::OnceLock;
 
 /// 6² texels a wall, 12 coefficients, probes 2³: whatever does not depend on sizes is tested with it, many times.
@@ -21,13 +18,13 @@ pub fn mobile_dictionary() -> &'static Dictionary {
     DICTIONARY.get_or_init(|| {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/versions/2.mrt");
         let bytes = std::fs::read(path).expect("a file of each version is committed");
-        Dictionary::from_bytes(&bytes, &mut ByteBudget::new(16 << 20)).expect("readable")
+        Dictionary::from_bytes_within(&bytes, &mut ByteBudget::new(16 << 20)).expect("readable")
     })
 }
 
 /// The level with the mobile dictionary.
 pub fn mobile(level: &Level) -> Scene {
-    assemble(level, mobile_dictionary(), &AssembleConfig::default()).expect("the level fits")
+    Scene::assemble(level, mobile_dictionary(), &AssembleConfig::default()).expect("the level fits")
 }
 
 /// A dictionary with vector irradiance, as small as they come.
@@ -60,7 +57,7 @@ pub fn stored(level: &Level, dictionary: &Dictionary, storage: Storage) -> Scene
         transport_storage: storage,
         ..AssembleConfig::default()
     };
-    assemble(level, dictionary, &config).expect("the level fits")
+    Scene::assemble(level, dictionary, &config).expect("the level fits")
 }
 
 /// Seldom dark, often bright, up to 0.99.
@@ -176,7 +173,8 @@ pub fn random_lights(
 ) -> Vec<Light> {
     let lights = (0..count).map(|_| random_light(random, level));
     let lights: Vec<Light> = lights.collect();
-    let fits = |light: &Light| mrt_runtime::light::placed::place(scene, 0, *light).is_ok();
+    let fits =
+        |light: &Light| mrt_runtime::low_level::light::placed::place(&scene.level, *light).is_ok();
     lights.into_iter().filter(fits).collect()
 }
 
@@ -187,7 +185,10 @@ pub fn outputs(frame: &Frame) -> [(&'static str, Vec<f32>); 6] {
         ("direct", frame.direct()),
         ("coefficients", frame.coefficients()),
         ("indirect", frame.indirect()),
-        ("lightmap", frame.lightmap().as_flattened().to_vec()),
+        (
+            "lightmap",
+            frame.lightmap().pixels().as_flattened().to_vec(),
+        ),
         ("probes", probes.unwrap_or_default()),
         ("vector", frame.vector().to_vec()),
     ]

@@ -18,7 +18,7 @@ use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
 
 /// Texels along an edge of the standard preset.
 pub const RESOLUTION: usize = 16;

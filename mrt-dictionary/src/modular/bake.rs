@@ -5,8 +5,8 @@ use crate::modular::bake_tubes::bake_tubes;
 use crate::modular::joint::{JointBasis, OwnLight, joint_basis};
 use crate::modular::lightfield::grid::LightfieldGrid;
 use crate::modular::lightfield::interface::{
-    InterfaceOperators, InterfaceSetup, LightfieldBasis, emitted_lightfield, enriched_basis,
-    interface_operators, lightfield_basis,
+    InterfaceOperators, InterfaceSetup, emitted_lightfield, enriched_basis, interface_operators,
+    lightfield_basis,
 };
 use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
 use crate::modular::outputs::cube::{ProbeSamples, probe_operator, vector_irradiance};
@@ -16,12 +16,14 @@ use crate::modular::paths::transport::Gather;
 use crate::modular::transport::cube::{ShapeTransport, neighbours, shape_transport};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_runtime::level::shape::{Hole, Outline, Shape, shape_set};
-use mrt_runtime::modular::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
-    Sources,
+use mrt_core::linalg::parity_modes::ParityBasis;
+use mrt_runtime::Dictionary;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::{Hole, Outline, shape_set};
+use mrt_runtime::low_level::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
 };
-use mrt_runtime::modular::path::Word;
+use mrt_runtime::low_level::modular::path::Word;
 
 /// Bakes a set of shapes with settings that pass [`BakeConfig::check`]. The same settings give the same bits
 /// on every machine and thread count.
@@ -252,12 +254,9 @@ fn pack_shape(
     }
 }
 
-fn pack_lightfields(
-    basis: &LightfieldBasis,
-    interface: &InterfaceOperators,
-) -> LightfieldOperators {
+fn pack_lightfields(basis: &ParityBasis, interface: &InterfaceOperators) -> LightfieldOperators {
     LightfieldOperators {
-        parity: basis.classes.iter().map(|&class| class as u8).collect(),
+        parity: basis.parity.clone(),
         from_emission: interface.from_emission.cast(),
         straight: interface.straight.cast(),
         left: interface.left.cast(),

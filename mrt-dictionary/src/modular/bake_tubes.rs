@@ -9,9 +9,7 @@ use crate::config::BakeConfig;
 use crate::modular::joint::{ForeignLight, JointBasis, OwnLight, joint_basis_of};
 use crate::modular::light_prior::tube::AreaWeights;
 use crate::modular::lightfield::grid::LightfieldGrid;
-use crate::modular::lightfield::interface::{
-    LightfieldBasis, exchanged, lightfield_basis, lightfield_coefficients,
-};
+use crate::modular::lightfield::interface::{exchanged, lightfield_basis, lightfield_coefficients};
 use crate::modular::lightfield::tube::{
     tube_emitted_lightfield, tube_enriched_basis, tube_interface,
 };
@@ -23,9 +21,11 @@ use crate::progress::{Cancelled, Progress};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::TubeForm;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathTable, ShapeOperators,
+use mrt_core::linalg::parity_modes::ParityBasis;
+use mrt_runtime::Dictionary;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, PathTable, ShapeOperators,
 };
 
 /// A tube of the set with its modes.
@@ -76,7 +76,7 @@ pub fn bake_tubes(
     }
     let modes = basis.vectors.columns();
     let identity = Matrix::from_fn(modes, modes, |i, j| f32::from(u8::from(i == j)));
-    let parity: Vec<u8> = basis.classes.iter().map(|&class| class as u8).collect();
+    let parity = basis.parity.clone();
     Ok(Dictionary {
         preset: config.preset.clone(),
         settings: config.describe(),
@@ -114,7 +114,7 @@ fn basis(
     config: &BakeConfig,
     step: &mut impl FnMut(&str) -> Result<(), Cancelled>,
     progress: &Progress,
-) -> Result<LightfieldBasis, Cancelled> {
+) -> Result<ParityBasis, Cancelled> {
     let classes = grid.parity_classes();
     let mut sent = Vec::new();
     for tube in tubes {
@@ -142,7 +142,7 @@ fn emitted(grid: &LightfieldGrid, tube: &Tube, opening: Face, config: &BakeConfi
 fn pack_tube(
     tube: &Tube,
     grid: &LightfieldGrid,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     turned: &Matrix<f64>,
     config: &BakeConfig,
     progress: &Progress,

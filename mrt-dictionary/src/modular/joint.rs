@@ -6,21 +6,23 @@
 //! coefficients need no projection; the others are the singular vectors of what `U_b` leaves of the responses.
 
 use crate::modular::outputs::cube::{
-    DIRECTIONS, PROBE_WEIGHT, ProbeSamples, probe_points, texel_axes,
+    DIRECTIONS, PROBE_WEIGHT, ProbeSamples, probe_points, probe_sample, texel_axes,
 };
-use crate::modular::paths::emission::GRAM_FLOOR;
-use crate::modular::paths::response::{ResponseBasis, pseudo_inverse, rows, stack};
+use crate::modular::paths::response::{ResponseBasis, rows, stack};
 use crate::modular::paths::transport::{RECEIVER, texel_at};
 use crate::modular::surface::mirrors::output_parity_classes;
-use crate::modular::transport::modes::whole_multiplets;
 use glam::{DVec3, IVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::least_squares::pseudo_inverse;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::{largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_core::linalg::parity_modes::{
+    GramModes, ModeChoice, ParityMode, combined_columns, gram_of_columns,
+};
+use mrt_core::linalg::svd::largest_entry_sign;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 
 /// Light of a shape's own modes.
 #[derive(Clone, Debug)]
@@ -202,12 +204,10 @@ pub fn response_at(
         })
         .collect();
     let walls = RECEIVER.texel_count(resolution);
-    let samples = probe_points(probes).flat_map(|p| {
-        let p = back.point(p);
-        DIRECTIONS.iter().map(move |d| {
-            let d: IVec3 = back.direction(d.as_dvec3()).as_ivec3();
-            let direction = DIRECTIONS.iter().position(|&other| other == d);
-            walls + probe_index(p, probes) * DIRECTIONS.len() + direction.unwrap_or(0)
+    let samples = probe_points(probes).flat_map(|point| {
+        DIRECTIONS.iter().map(move |direction| {
+            let direction: IVec3 = back.direction(direction.as_dvec3()).as_ivec3();
+            walls + probe_sample(back.point(point), direction, probes)
         })
     });
     let sources: Vec<Option<usize>> = texels.iter().copied().chain(samples.map(Some)).collect();
@@ -239,11 +239,6 @@ pub fn response_at(
         }
     });
     (field, vector)
-}
-
-fn probe_index(point: DVec3, probes: usize) -> usize {
-    let k = (point * probes as f64).floor().as_uvec3();
-    (k.z as usize * probes + k.y as usize) * probes + k.x as usize
 }
 
 /// Modes as weights of the responses' columns.
@@ -284,43 +279,40 @@ fn extra_modes(
     let columns: Vec<(usize, usize)> = (0..responses.len())
         .flat_map(|r| (0..scales.len()).map(move |k| (r, k)))
         .collect();
-    let mut found: Vec<(f64, usize, Vec<f64>)> = Vec::new();
-    for class in 0..classes.class_count() {
-        let folded: Vec<Vec<f64>> = columns
-            .iter()
-            .map(|&(r, k)| {
-                let mut signal = classes.fold(class, responses[r].rest.column(k));
-                signal.iter_mut().for_each(|x| *x *= scales[k]);
-                signal
-            })
-            .collect();
-        let folded = Matrix::from_columns(classes.dimension(class), &folded);
-        let gram = transpose_multiply(folded.view(), folded.view());
-        let (values, vectors) = symmetric_eigen(gram.view());
-        let largest = values.first().copied().unwrap_or(0.0);
-        for (k, &value) in values.iter().enumerate() {
-            if value <= GRAM_FLOOR * largest || value <= 0.0 {
-                break;
-            }
-            // The class's part of each column, spelled out in columns: mirrors exchange openings and modes, so
-            // the weights alone have the class's parity.
-            let vector = multiply(folded.view(), vectors.columns_view(k..k + 1));
-            let scale = largest_entry_sign(vector.data()) / value.sqrt();
-            let weights: Vec<f64> = vectors
-                .column(k)
+    let parts: Vec<(Matrix<f64>, GramModes)> = (0..classes.class_count())
+        .map(|class| {
+            let folded: Vec<Vec<f64>> = columns
                 .iter()
-                .zip(&columns)
-                .map(|(w, &(_, mode))| w * scale * scales[mode])
+                .map(|&(r, k)| {
+                    let mut signal = classes.fold(class, responses[r].rest.column(k));
+                    signal.iter_mut().for_each(|x| *x *= scales[k]);
+                    signal
+                })
                 .collect();
-            found.push((value.sqrt(), class, weights));
-        }
-    }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let values: Vec<f64> = found.iter().map(|mode| mode.0).collect();
-    let kept = whole_multiplets(&values, extra).min(extra);
+            let folded = Matrix::from_columns(classes.dimension(class), &folded);
+            let modes = GramModes::of(&gram_of_columns(&folded));
+            (folded, modes)
+        })
+        .collect();
+    let values = parts.iter().map(|(_, part)| &part.singular_values[..]);
+    let mut choice = ModeChoice::largest(values, extra);
+    // A frame pays for every mode, so not even the first multiplet may exceed what is asked for.
+    choice.truncate(extra);
+    let weights = choice.kept.iter().map(|&ParityMode { class, position }| {
+        let (folded, part) = &parts[class];
+        let vector = part.vectors.column(position);
+        // Mirrors exchange openings and modes, so the weights of a class's part of the columns are those of the
+        // columns themselves.
+        let sign = largest_entry_sign(&combined_columns(folded, vector));
+        let scale = sign / part.singular_values[position];
+        let weights = vector.iter().zip(&columns);
+        weights
+            .map(|(w, &(_, mode))| w * scale * scales[mode])
+            .collect()
+    });
     Extra {
-        kept_energy: values[..kept].iter().map(|s| s * s).sum(),
-        weights: found.into_iter().take(kept).map(|mode| mode.2).collect(),
+        weights: weights.collect(),
+        kept_energy: choice.scales().iter().map(|s| s * s).sum(),
     }
 }
 

@@ -6,8 +6,10 @@ use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
 use crate::modular::surface::mirrors::texel_parity_classes;
 use crate::modular::transport::modes::{block_transport, fold_bounce};
 use crate::progress::{Cancelled, Progress};
-use mrt_core::linalg::svd::{energy_rank, svd};
-use mrt_runtime::level::shape::SHAPES;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::linalg::parity_modes::ModeChoice;
+use mrt_core::linalg::svd::{Svd, energy_rank, svd};
+use mrt_runtime::blocks::SHAPES;
 
 /// `k_d` of the paper's table.
 const TABLE_PRIOR_VECTORS: usize = 64;
@@ -61,13 +63,10 @@ pub fn closed_cube_spectra(
         &classes,
         TABLE_PRIOR_VECTORS,
     );
-    let all_values = |folded: &[mrt_core::linalg::matrix::Matrix<f64>]| {
-        let mut values: Vec<f64> = folded
-            .iter()
-            .flat_map(|part| svd(part.view()).singular_values)
-            .collect();
-        values.sort_by(|a, b| b.total_cmp(a));
-        values
+    let all_values = |folded: &[Matrix<f64>]| {
+        let parts: Vec<Svd> = folded.iter().map(|part| svd(part.view())).collect();
+        let values = parts.iter().map(|part| &part.singular_values[..]);
+        ModeChoice::largest(values, usize::MAX).singular_values
     };
     Ok(vec![
         Spectrum {

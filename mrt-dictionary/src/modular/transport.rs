@@ -2,6 +2,5 @@
 
 pub mod modes;
 pub mod cube;
-mod snapshots;
 pub mod tube;
 pub mod warped;

@@ -10,14 +10,14 @@ use mrt_core::reference::oracle_file::{
     Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceError, ReferenceFile, read,
 };
 use mrt_dictionary::config::BakeConfig;
-use mrt_runtime::level::block::{CellsError, Level};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::SkippedLight;
+use mrt_runtime::blocks::CellsError;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, Level, Light, Outputs,
+    ProbeOrder, Scene,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -108,11 +108,11 @@ pub enum AccuracyError {
     },
     /// A light is refused.
     #[error("{scene}: {source}")]
-    Frame {
+    Light {
         /// Name of the reference.
         scene: String,
         /// Why.
-        source: FrameError,
+        source: SkippedLight,
     },
     /// Probe references need probes.
     #[error(
@@ -298,7 +298,7 @@ pub fn compare(
         ..AssembleConfig::default()
     };
     let scene =
-        assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
+        Scene::assemble(&level, dictionary, &config).map_err(|source| AccuracyError::Assemble {
             scene: scene_name(),
             source,
         })?;
@@ -308,7 +308,12 @@ pub fn compare(
         probes: is_probes.then_some(ProbeOrder::L2),
         vector: false,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let config = FrameConfig {
+        outputs,
+        bounces: frame_bounces(reference, args),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
     (0..reference.lights.len())
         .map(|light| {
             let source = Light::Sphere {
@@ -316,9 +321,11 @@ pub fn compare(
                 radius: 0.0,
                 intensity: Vec3::splat(reference.intensity as f32),
             };
+            frame.set_lights(&[source]);
             frame
-                .solve(&scene, &[source], &Openings, frame_bounces(reference, args))
-                .map_err(|source| AccuracyError::Frame {
+                .solve()
+                .require_all_lights()
+                .map_err(|source| AccuracyError::Light {
                     scene: scene_name(),
                     source,
                 })?;
@@ -407,14 +414,14 @@ fn our_signal(
     if let Kind::RadianceSh9 { points, .. } = &reference.kind {
         return our_probes(reference, scene, frame, points);
     }
-    let resolution = reference.resolution.unwrap_or(scene.resolution);
+    let resolution = reference.resolution.unwrap_or(scene.level.resolution);
     let channels = match reference.kind {
         Kind::IrradianceRgb { .. } => 3,
         _ => 1,
     };
     let mut ours = Vec::new();
     for (block, face) in reference.walls.iter().copied() {
-        let canonical = scene.blocks[block].orientation.inverse();
+        let canonical = scene.level.blocks[block].orientation.inverse();
         for texel in 0..resolution * resolution {
             let (row, column) = (texel / resolution, texel % resolution);
             let point = canonical.point(face.texel_center(resolution, row, column));
@@ -423,9 +430,9 @@ fn our_signal(
             // Walls of the reference are walls of the level: both follow from the cells.
             let light = scene
                 .atlas
-                .pixel(block, face, u, v)
+                .pixel(BlockIndex::new(block), face, u, v)
                 .map_or([0.0; 3], |pixel| {
-                    scene.atlas.sample(frame.lightmap(), pixel)
+                    scene.atlas.sample(frame.lightmap().pixels(), pixel)
                 });
             ours.extend(light[..channels].iter().map(|&e| f64::from(e)));
         }
@@ -447,7 +454,7 @@ fn our_probes(
     let mut ours = Vec::with_capacity(9 * points.len());
     for &point in points {
         let light = probes
-            .at(scene, point)
+            .at(&scene.level, point)
             .ok_or_else(|| AccuracyError::ProbeOutside {
                 scene: scene_name(),
                 found: point,

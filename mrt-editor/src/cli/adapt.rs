@@ -9,10 +9,10 @@ use mrt_dictionary::modular::variants::advice::{BlockEstimate, Thresholds, estim
 use mrt_dictionary::modular::variants::build::{
     VariantConfig, VariantError, has_hole, make_variants,
 };
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::warp_form::same_form;
-use mrt_runtime::modular::dictionary::{Dictionary, Variant, WarpTransport};
-use mrt_runtime::modular::dictionary_file::DictionaryError;
+use mrt_runtime::blocks::WarpTransport;
+use mrt_runtime::low_level::level::warp_form::same_form;
+use mrt_runtime::low_level::modular::dictionary::Variant;
+use mrt_runtime::{Dictionary, DictionaryError, Level};
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -4,20 +4,16 @@ use crate::cli::dictionary_source::{SourceError, load};
 use crate::cli::reference_level::{LevelErrors, ReferenceLevelError, measure};
 use crate::cli::table::Table;
 use crate::render::camera::Camera;
-use crate::render::file::{WriteError, write_png};
+use crate::render::file::{Saves, WriteError, write_png};
 use crate::render::level_view::{LevelView, ViewError};
 use crate::render::tone::{auto_exposure, tone_map};
 use crate::render::{Picture, render};
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::text::{LevelTextError, from_text};
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, StageTimes};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameConfig, Level, LevelTextError,
+    Light, Scene, SkippedLight, StageTimes,
+};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -93,7 +89,7 @@ pub enum DemoError {
     Assemble(#[from] AssembleError),
     /// A light is refused.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// Nothing can be seen.
     #[error(transparent)]
     View(#[from] ViewError),
@@ -144,18 +140,20 @@ pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
     let dictionary = load(args.dictionary.as_deref(), None)?;
     let level = read_level(args)?;
     let start = Instant::now();
-    let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let assemble_ms = milliseconds(start.elapsed());
     let lights = maze_lights(&scene);
-    let mut frame = Frame::new(&scene);
-    let times = time_frames(&mut frame, &scene, &lights)?;
+    let mut frame = Frame::new(&scene, FrameConfig::default());
+    let times = time_frames(&mut frame, &lights)?;
     let errors = if args.no_exact {
         None
     } else {
         eprintln!("solving the same level exactly, to compare");
         Some(measure(&level, &scene, &mut frame, &lights, BOUNCES)?)
     };
-    frame.solve(&scene, &lights, &Openings, Bounces::Count(BOUNCES))?;
+    frame.set_lights(&lights);
+    frame.set_bounces(Bounces::Count(BOUNCES));
+    frame.solve().require_all_lights()?;
     let pictures = take_pictures(args, &level, &scene, &frame, &lights)?;
     let report = report(
         &level,
@@ -185,20 +183,20 @@ fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
             }
         }
     };
-    from_text(&text).map_err(|source| DemoError::Level { place, source })
+    Level::from_text(&text).map_err(|source| DemoError::Level { place, source })
 }
 
 /// A warm light in the first block and a cool one in the block farthest from it.
 fn maze_lights(scene: &Scene) -> Vec<Light> {
-    let center = |block: usize| scene.blocks[block].warp.center();
-    let far = (0..scene.blocks.len())
+    let center = |block: usize| scene.level.blocks[block].warp.center();
+    let far = (0..scene.level.blocks.len())
         .max_by(|&a, &b| {
             let distance = |block: usize| center(block).distance(center(0));
             distance(a).total_cmp(&distance(b))
         })
         .unwrap_or(0);
     let sphere = |block: usize, unit: DVec3, intensity: Vec3| {
-        let warp = &scene.blocks[block].warp;
+        let warp = &scene.level.blocks[block].warp;
         let size = block_size(warp);
         Light::Sphere {
             position: warp.point(unit).as_vec3(),
@@ -221,17 +219,16 @@ fn block_size(warp: &Hexahedron) -> f32 {
 }
 
 /// The fastest of several frames of one bounce, each computed anew.
-fn time_frames(
-    frame: &mut Frame,
-    scene: &Scene,
-    lights: &[Light],
-) -> Result<StageTimes, FrameError> {
+fn time_frames(frame: &mut Frame, lights: &[Light]) -> Result<StageTimes, SkippedLight> {
+    frame.set_lights(lights);
+    frame.set_bounces(Bounces::Count(1));
     let mut best: Option<StageTimes> = None;
     for _ in 0..TIMED_FRAMES {
         // Nothing changes between them, and a frame skips what has not changed.
         frame.forget();
-        frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
-        let times = frame.times();
+        let report = frame.solve();
+        report.require_all_lights()?;
+        let times = report.times();
         if best.is_none_or(|best| times.total() < best.total()) {
             best = Some(times);
         }
@@ -260,14 +257,14 @@ fn take_pictures(
         });
     let (min, max) = (min.as_vec3(), max.as_vec3());
     let (middle, extent) = (0.5 * (min + max), (max - min).max_element());
-    let size = block_size(&scene.blocks[0].warp);
+    let size = block_size(&scene.level.blocks[0].warp);
     let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
     let from_above = middle + Vec3::new(0.0, 1.0 * extent, 0.6 * extent);
-    let eye = scene.blocks[0]
+    let eye = scene.level.blocks[0]
         .warp
         .point(DVec3::new(0.06, 0.5, 0.5))
         .as_vec3();
-    let ahead = scene.blocks[0]
+    let ahead = scene.level.blocks[0]
         .warp
         .point(DVec3::new(3.0, 0.42, 0.5))
         .as_vec3();
@@ -301,7 +298,7 @@ fn take_pictures(
             let path = args.out.join(format!("{name}-{part}.png"));
             let mut srgb = tone_map(&picture, exposure);
             over_background(&mut srgb, &coverage);
-            write_png(&path, [width, height], &srgb)?;
+            write_png(&path, [width, height], &srgb, Saves::Time)?;
             written.push(path.display().to_string());
         }
     }
@@ -330,7 +327,7 @@ fn report(
     errors: Option<LevelErrors>,
     pictures: Vec<String>,
 ) -> DemoReport {
-    let used = |shape| scene.blocks.iter().any(|block| block.shape == shape);
+    let used = |shape| scene.level.blocks.iter().any(|block| block.shape == shape);
     DemoReport {
         blocks: level.blocks.len(),
         connections: level.connections.len(),
@@ -350,7 +347,7 @@ fn report(
             ("b = T_d->b l", milliseconds(times.coefficients)),
             ("r = T_b->r b", milliseconds(times.responses)),
             ("U_b b + U_r r", milliseconds(times.indirect)),
-            ("lightmap atlas", milliseconds(times.atlas)),
+            ("lightmap atlas", milliseconds(times.lightmap)),
         ],
         frame_ms: milliseconds(times.total()),
         errors,

@@ -5,8 +5,8 @@ use mrt_core::container::{ByteBudget, ContainerError, read_file};
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::dictionary_file::{DEFAULT_BYTE_BUDGET, DictionaryError};
+use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
+use mrt_runtime::{Dictionary, DictionaryError};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -98,7 +98,7 @@ pub fn read_dictionary_file(path: &Path) -> Result<Vec<u8>, SourceError> {
 }
 
 fn parse(bytes: &[u8], place: String) -> Result<Dictionary, SourceError> {
-    Dictionary::from_bytes(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
+    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
         .map_err(|source| SourceError::Dictionary { place, source })
 }
 

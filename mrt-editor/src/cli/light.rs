@@ -26,13 +26,9 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::corner_normals;
 use mrt_dictionary::modular::variants::warp_error::guessed_error;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::{Openings, Rays};
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::WarpTransport;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::blocks::WarpTransport;
+use mrt_runtime::shadows::Rays;
+use mrt_runtime::{AssembleConfig, Bounces, Frame, FrameConfig, FrameReport, Level, Light, Scene};
 use report::{Report, light_row};
 use std::path::Path;
 use std::time::Instant;
@@ -120,11 +116,16 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     let dictionary = load(args.dictionary.as_deref(), args.preset.as_deref())?;
     let dictionary_seconds = dictionary_start.elapsed().as_secs_f64();
     let assemble_start = Instant::now();
-    let scene = assemble(&level, &dictionary, &AssembleConfig::default())?;
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let assemble_seconds = assemble_start.elapsed().as_secs_f64();
-    let mut frame = Frame::new(&scene);
+    let config = FrameConfig {
+        bounces: args.bounces.map_or(CONVERGED, Bounces::Count),
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
     let frame_start = Instant::now();
-    solve(&mut frame, &scene, &lights, &bvh, args)?;
+    let solved = solve(&mut frame, &lights, &bvh, args);
+    solved.require_all_lights()?;
     let frame_milliseconds = frame_start.elapsed().as_secs_f64() * 1e3;
 
     let lit = LitScene {
@@ -133,7 +134,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
         bvh: &bvh,
         receivers: &receivers,
         atlas: &scene.atlas,
-        lightmap: frame.lightmap(),
+        lightmap: frame.lightmap().pixels(),
         lights: &lights,
         restart: surroundings.restart(),
         hides_outside: false,
@@ -145,7 +146,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
         blocks: level.blocks.len(),
         connections: level.connections.len(),
         lights: lights.iter().map(light_row).collect(),
-        passes: frame.passes(),
+        passes: solved.passes(),
         dictionary_seconds,
         assemble_seconds,
         frame_milliseconds,
@@ -263,13 +264,7 @@ fn place_lights(
     Ok(lights)
 }
 
-fn solve(
-    frame: &mut Frame,
-    scene: &Scene,
-    lights: &[SphereLight],
-    bvh: &Bvh,
-    args: &LightArgs,
-) -> Result<(), FrameError> {
+fn solve(frame: &mut Frame, lights: &[SphereLight], bvh: &Bvh, args: &LightArgs) -> FrameReport {
     let lights: Vec<Light> = lights
         .iter()
         .map(|light| Light::Sphere {
@@ -278,11 +273,11 @@ fn solve(
             intensity: light.intensity,
         })
         .collect();
-    let bounces = args.bounces.map_or(CONVERGED, Bounces::Count);
+    frame.set_lights(&lights);
     match args.shadows {
-        Shadows::Openings => frame.solve(scene, &lights, &Openings, bounces),
+        Shadows::Openings => frame.solve(),
         Shadows::Rays => {
-            let slack = WALL_SLACK * smallest_width(scene);
+            let slack = WALL_SLACK * smallest_width(frame.scene());
             let rays = Rays(|receiver: DVec3, light: DVec3| {
                 // From the light, and short of the receiver: a block's wall stands a little behind the
                 // real one.
@@ -292,13 +287,14 @@ fn solve(
                     && bvh.is_occluded(light.as_vec3(), towards.as_vec3(), reach as f32);
                 if is_blocked { 0.0 } else { 1.0 }
             });
-            frame.solve(scene, &lights, &rays, bounces)
+            frame.solve_with(&rays)
         }
     }
 }
 
 fn smallest_width(scene: &Scene) -> f64 {
     scene
+        .level
         .blocks
         .iter()
         .map(|block| {

@@ -4,9 +4,11 @@ use crate::cli::output::is_same_place;
 use crate::fit_level::paint::Coverage;
 use crate::fit_level::voxels::Winding;
 use crate::fit_level::{Fit, MapConfig, MapError, Mapped, map_mesh};
-use crate::import::{ImportConfig, ImportError, ImportReport, UpAxis, read_scene};
+use crate::import::error::ImportError;
+use crate::import::report::ImportReport;
+use crate::import::{ImportConfig, UpAxis, read_scene};
 use mrt_core::container::{ContainerError, write_file_atomically};
-use mrt_runtime::level::text::{LevelTextError, to_text};
+use mrt_runtime::LevelTextError;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -135,7 +137,7 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
         winding: args.winding,
     };
     let mapped = map_mesh(&scene.mesh, &config)?;
-    write_file_atomically(&args.out, to_text(&mapped.level)?.as_bytes())?;
+    write_file_atomically(&args.out, mapped.level.to_text()?.as_bytes())?;
     let report = Report::new(scene.report, &mapped, start);
     if args.json {
         // A struct of numbers and names always has a text.

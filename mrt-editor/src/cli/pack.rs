@@ -7,10 +7,10 @@ use crate::cli::output::is_same_place;
 use crate::cli::table::Table;
 use crate::document::level_file::{LevelFileError, read_level};
 use mrt_core::container::{ByteBudget, ContainerError, write_file_atomically};
-use mrt_runtime::modular::assemble::AssembleError;
-use mrt_runtime::modular::dictionary::{OperatorKind, StoredDictionary};
-use mrt_runtime::modular::dictionary_file::{DEFAULT_BYTE_BUDGET, DictionaryError};
-use mrt_runtime::modular::pack::{PackConfig, pack};
+use mrt_runtime::low_level::modular::dictionary::{OperatorKind, StoredDictionary};
+use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
+use mrt_runtime::low_level::modular::pack::{PackConfig, pack};
+use mrt_runtime::{AssembleError, DictionaryError};
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -7,11 +7,7 @@ use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters
 use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene, Side};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::{BlockIndex, Bounces, Frame, Level, Light, Scene, SkippedLight};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -38,9 +34,9 @@ pub enum ReferenceLevelError {
     /// The exact solver refuses the level.
     #[error("exact solution: {0}")]
     Exact(#[from] ExactError),
-    /// The frame refuses a light.
+    /// A light does not shine.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// Its walls are flat.
     #[error(
         "exact solution: block {block} is a `{shape}`; expected only cubes, since the exact solver has flat walls"
@@ -76,17 +72,24 @@ pub fn measure(
         return Err(ReferenceLevelError::Tube { block, shape });
     }
     let start = Instant::now();
-    let exact = exact_scene(level, scene.resolution)?;
+    let exact = exact_scene(level, scene.level.resolution)?;
     let transport = Transport::build(&exact);
     let first = exact_irradiance(level, &exact, &transport, lights, 1)?;
     let many = exact_irradiance(level, &exact, &transport, lights, bounces as usize)?;
     let direct = exact_direct(&exact, lights)?;
     let exact_seconds = start.elapsed().as_secs_f64();
-    frame.solve(scene, lights, &Openings, Bounces::Count(1))?;
-    let our_first = in_level_order(level, scene, &frame.indirect());
-    frame.solve(scene, lights, &Openings, Bounces::Count(bounces))?;
-    let our_many = in_level_order(level, scene, &frame.indirect());
-    let our_direct = in_level_order(level, scene, &frame.direct());
+    frame.set_lights(lights);
+    let mut signal = Vec::new();
+    let mut indirect = |frame: &mut Frame, bounces: u32| {
+        frame.set_bounces(Bounces::Count(bounces));
+        frame.solve().require_all_lights()?;
+        frame.copy_indirect_to(&mut signal);
+        Ok::<_, SkippedLight>(in_level_order(level, scene, &signal))
+    };
+    let our_first = indirect(frame, 1)?;
+    let our_many = indirect(frame, bounces)?;
+    frame.copy_direct_to(&mut signal);
+    let our_direct = in_level_order(level, scene, &signal);
     let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect::<Vec<_>>();
     Ok(LevelErrors {
         first_bounce: rel_l2(&our_first, &first),
@@ -185,11 +188,14 @@ fn exact_direct(exact: &ExactScene, lights: &[Light]) -> Result<Vec<f64>, Refere
 fn in_level_order(level: &Level, scene: &Scene, signal: &[f32]) -> Vec<f64> {
     let mut out = Vec::with_capacity(signal.len());
     for (index, block) in level.blocks.iter().enumerate() {
-        let range = &scene.blocks[index].texels;
+        let range = &scene.level.blocks[index].texels;
         for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
-            for row in 0..scene.resolution {
-                for column in 0..scene.resolution {
-                    let texel = scene.level_texel(index, face, row, column).unwrap_or(0);
+            for row in 0..scene.level.resolution {
+                for column in 0..scene.level.resolution {
+                    let texel = scene
+                        .level
+                        .level_texel(BlockIndex::new(index), face, row, column)
+                        .unwrap_or(0);
                     for channel in 0..3 {
                         let at = 3 * range.start + channel * range.len() + texel;
                         out.push(f64::from(signal[at]));

@@ -1,8 +1,8 @@
 //! Reading and writing a level's file.
 
 use mrt_core::container::{ContainerError, write_file_atomically};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::text::{LevelTextError, MAX_TEXT_BYTES, from_text, to_text};
+use mrt_runtime::low_level::level::text::MAX_TEXT_BYTES;
+use mrt_runtime::{Level, LevelTextError};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -47,7 +47,7 @@ pub fn read_level(path: &Path) -> Result<Level, LevelFileError> {
         .read_to_end(&mut bytes)
         .map_err(io)?;
     let text = String::from_utf8_lossy(&bytes);
-    from_text(&text).map_err(|source| LevelFileError::Level {
+    Level::from_text(&text).map_err(|source| LevelFileError::Level {
         path: path.to_owned(),
         source,
     })
@@ -58,7 +58,7 @@ pub fn read_level(path: &Path) -> Result<Level, LevelFileError> {
 /// # Errors
 /// [`LevelFileError::Level`] and [`LevelFileError::Write`].
 pub fn write_level(path: &Path, level: &Level) -> Result<(), LevelFileError> {
-    let text = to_text(level).map_err(|source| LevelFileError::Level {
+    let text = level.to_text().map_err(|source| LevelFileError::Level {
         path: path.to_owned(),
         source,
     })?;

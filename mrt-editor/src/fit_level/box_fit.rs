@@ -3,8 +3,8 @@
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::CubeRotation;
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::level::block::{Block, Level};
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::Level;
+use mrt_runtime::blocks::{Block, Shape};
 
 /// Share of the area that may lie outside on each side of each axis.
 const OUTLIER_SHARE: f64 = 0.005;

@@ -5,9 +5,9 @@ use super::voxels::FreeSpace;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::level::block::{
-    Block, Connection, Level, LevelError, Opening, shape_with_openings,
-};
+use mrt_runtime::blocks::{Block, Connection, Opening};
+use mrt_runtime::low_level::level::cells::shape_with_openings;
+use mrt_runtime::{Level, LevelError};
 
 /// What becomes a block and a connection.
 #[derive(Clone, Copy, Debug, PartialEq)]

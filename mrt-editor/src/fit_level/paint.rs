@@ -5,7 +5,7 @@ use crate::receiver::ReceiverMap;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::mesh::TriangleMesh;
-use mrt_runtime::level::block::Level;
+use mrt_runtime::Level;
 use serde::Serialize;
 
 /// A point is near a block within this share of the block's diagonal: walls of real rooms have niches,

@@ -1,7 +1,6 @@
 //! Pictures as files, which are there whole or not at all.
 
-use super::Picture;
-use image::{ExtendedColorType, ImageEncoder};
+use super::{Picture, hdr};
 use mrt_core::container::{ContainerError, write_file_atomically};
 use std::path::{Path, PathBuf};
 
@@ -25,46 +24,56 @@ pub enum WriteError {
         /// Which file.
         path: PathBuf,
         /// What the encoder says.
-        source: image::ImageError,
+        source: png::EncodingError,
     },
 }
 
-/// Writes 8-bit sRGB pixels as PNG.
+/// What the encoder of a PNG file saves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Saves {
+    /// Time: for pictures that are looked at and thrown away.
+    Time,
+    /// Bytes: for pictures that are kept.
+    Bytes,
+}
+
+/// Writes 8-bit sRGB pixels, row by row from the top, as PNG; returns the file's bytes.
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn write_png(path: &Path, size: [usize; 2], srgb: &[u8]) -> Result<(), WriteError> {
+pub fn write_png(
+    path: &Path,
+    [width, height]: [usize; 2],
+    srgb: &[u8],
+    saves: Saves,
+) -> Result<usize, WriteError> {
     let mut bytes = Vec::new();
-    image::codecs::png::PngEncoder::new(&mut bytes)
-        .write_image(
-            srgb,
-            size[0] as u32,
-            size[1] as u32,
-            ExtendedColorType::Rgb8,
-        )
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(match saves {
+        Saves::Time => png::Compression::Fast,
+        Saves::Bytes => png::Compression::High,
+    });
+    encoder.set_filter(png::Filter::Adaptive);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(srgb)?;
+            writer.finish()
+        })
         .map_err(|source| WriteError::Encode {
             path: path.to_owned(),
             source,
         })?;
-    Ok(write_file_atomically(path, &bytes)?)
+    write_file_atomically(path, &bytes)?;
+    Ok(bytes.len())
 }
 
 /// Writes linear pixels as Radiance HDR.
 ///
 /// # Errors
-/// [`WriteError`].
+/// [`WriteError::File`].
 pub fn write_hdr(path: &Path, picture: &Picture) -> Result<(), WriteError> {
-    let mut bytes = Vec::new();
-    let pixels: Vec<image::Rgb<f32>> = picture
-        .pixels
-        .iter()
-        .map(|colour| image::Rgb(colour.to_array()))
-        .collect();
-    image::codecs::hdr::HdrEncoder::new(&mut bytes)
-        .encode(&pixels, picture.width, picture.height)
-        .map_err(|source| WriteError::Encode {
-            path: path.to_owned(),
-            source,
-        })?;
-    Ok(write_file_atomically(path, &bytes)?)
+    Ok(write_file_atomically(path, &hdr::encode(picture))?)
 }

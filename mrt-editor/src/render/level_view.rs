@@ -4,12 +4,11 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::mesh::TriangleMesh;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::light::direct_light::irradiance;
-use mrt_runtime::light::placed::{Light, LightError, PlacedLight, place};
-use mrt_runtime::light::visibility::{Openings, Receiver};
-use mrt_runtime::modular::frame::Frame;
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::light::direct_light::{Shadows, irradiance};
+use mrt_runtime::low_level::light::placed::{PlacedLight, place};
+use mrt_runtime::shadows::{Openings, Receiver};
+use mrt_runtime::{BlockIndex, Frame, Light, LightError, Scene};
 use std::f32::consts::PI;
 
 /// Parts along each axis into which a wall is cut: warped walls are bent.
@@ -41,7 +40,7 @@ pub enum ViewError {
 
 #[derive(Clone, Copy, Debug)]
 struct Patch {
-    block: usize,
+    block: BlockIndex,
     face: Face,
     /// (u, v) of the triangle's corners on the face.
     corners: [[f32; 2]; 3],
@@ -71,11 +70,10 @@ impl<'a> LevelView<'a> {
     ) -> Result<Self, ViewError> {
         let lights = lights
             .iter()
-            .enumerate()
-            .map(|(index, &light)| place(scene, index, light))
+            .map(|&light| place(&scene.level, light))
             .collect::<Result<_, _>>()?;
         let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-        for (index, block) in scene.blocks.iter().enumerate() {
+        for (index, block) in scene.level.blocks.iter().enumerate() {
             for face in block.shape.walls() {
                 if !with_ceilings && block.orientation.face(face) == Face::PosY {
                     continue;
@@ -95,7 +93,7 @@ impl<'a> LevelView<'a> {
                             positions.push(block.warp.point(wall.position).as_vec3());
                         }
                         triangles.push(Patch {
-                            block: index,
+                            block: BlockIndex::new(index),
                             face,
                             corners,
                         });
@@ -131,13 +129,13 @@ impl<'a> LevelView<'a> {
     fn seen(&self, mut origin: Vec3, direction: Vec3) -> Option<Seen> {
         let mut start = 0.0;
         // A ray crosses each block at most twice.
-        for _ in 0..2 * self.scene.blocks.len() + 2 {
+        for _ in 0..2 * self.scene.level.blocks.len() + 2 {
             let hit = self.bvh.closest_hit(origin, direction, f32::MAX)?;
             let patch = self.triangles[hit.triangle as usize];
             let [a, b, c] = patch.corners;
             let mix = |k: usize| a[k] + hit.u * (b[k] - a[k]) + hit.v * (c[k] - a[k]);
             let (u, v) = (mix(0), mix(1));
-            let block = &self.scene.blocks[patch.block];
+            let block = &self.scene.level.blocks[patch.block.get()];
             let wall = block
                 .shape
                 .wall_point(patch.face, f64::from(u), f64::from(v));
@@ -165,39 +163,35 @@ impl<'a> LevelView<'a> {
             normal,
             ..
         } = *seen;
-        let block = &self.scene.blocks[patch.block];
+        let block = &self.scene.level.blocks[patch.block.get()];
         let (across, up) = (f64::from(u), f64::from(v));
         let wall = block.shape.wall_point(patch.face, across, up);
         let receiver = Receiver {
             block: patch.block,
             position: block.warp.point(wall.position),
         };
-        let direct: Vec3 = self
-            .lights
-            .iter()
-            .map(|light| {
-                irradiance(
-                    self.scene,
-                    light,
-                    &self.scene.doors,
-                    receiver,
-                    normal,
-                    &Openings,
-                )
-            })
+        let shadows = Shadows {
+            level: &self.scene.level,
+            doors: &self.scene.level.doors,
+            visibility: &Openings,
+        };
+        let lights = self.lights.iter();
+        let direct: Vec3 = lights
+            .map(|light| irradiance(shadows, light, receiver, normal))
             .sum();
         let atlas = &self.scene.atlas;
         let indirect = atlas
             .pixel(patch.block, patch.face, u, v)
             .map_or(Vec3::ZERO, |pixel| {
-                Vec3::from_array(atlas.sample(self.frame.lightmap(), pixel))
+                Vec3::from_array(atlas.sample(self.frame.lightmap().pixels(), pixel))
             });
-        let texel = Shape::texel_of_uv(self.scene.resolution, across, up);
+        let texel = Shape::texel_of_uv(self.scene.level.resolution, across, up);
         let albedo = block
             .shape
-            .wall_offset(patch.face, self.scene.resolution)
+            .wall_offset(patch.face, self.scene.level.resolution)
             .map_or(Vec3::ZERO, |offset| {
-                self.scene.texel_albedo(block.texels.start + offset + texel)
+                let albedo = self.frame.texel_albedo(patch.block, offset + texel);
+                albedo.unwrap_or(Vec3::ZERO)
             });
         (direct * albedo / PI, indirect * albedo / PI)
     }

@@ -5,7 +5,8 @@ use glam::Vec3;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
-use mrt_runtime::output::lightmap_atlas::AtlasLayout;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::low_level::output::lightmap_atlas::LightmapAtlas;
 use std::f32::consts::PI;
 
 /// Shadow rays to each light that are always cast.
@@ -40,7 +41,7 @@ pub struct LitScene<'a> {
     /// From points of the mesh to walls of blocks.
     pub receivers: &'a ReceiverMap,
     /// From walls of blocks to the lightmap.
-    pub atlas: &'a AtlasLayout,
+    pub atlas: &'a LightmapAtlas,
     /// Indirect irradiance, W/m².
     pub lightmap: &'a [[f32; 3]],
     /// Lights, for the direct part.
@@ -174,7 +175,9 @@ impl LitScene<'_> {
             .iter()
             .filter_map(|(receiver, weight)| {
                 let (u, v) = (receiver.u as f32, receiver.v as f32);
-                let pixel = self.atlas.pixel(receiver.block, receiver.face, u, v)?;
+                let pixel =
+                    self.atlas
+                        .pixel(BlockIndex::new(receiver.block), receiver.face, u, v)?;
                 let irradiance = self.atlas.sample(self.lightmap, pixel);
                 Some(Vec3::from_array(irradiance) * *weight as f32)
             })

@@ -5,7 +5,8 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::{TriangleMesh, bounds};
 use mrt_core::lighting::sampling::{hammersley_point, sphere_from_square, square_from_unit};
-use mrt_runtime::level::block::{Block, Level};
+use mrt_runtime::Level;
+use mrt_runtime::blocks::Block;
 use std::f32::consts::TAU;
 
 /// Vertical angle of view.

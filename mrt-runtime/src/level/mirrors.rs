@@ -1,10 +1,10 @@
 //! The mirrors that leave a canonical shape as it is.
 
 use crate::level::shape::{Outline, Shape};
-use glam::{DVec3, IVec3};
+use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
-use std::collections::HashMap;
+use mrt_core::geometry::texel_permutation;
 
 /// True if the map takes every opening to one of the same outline; holes know up, so it must keep y there.
 fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
@@ -39,14 +39,6 @@ pub fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
 /// # Panics
 /// If the symmetry does not keep the shape.
 pub fn texel_permutation(shape: &Shape, resolution: usize, map: CubeSymmetry) -> Vec<u32> {
-    // Texel centres are odd multiples of half a step: exact as integers.
-    let key = |face: Face, p: DVec3| -> (Face, IVec3) {
-        (face, (p * (2 * resolution) as f64).round().as_ivec3())
-    };
     let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
-    let index: HashMap<_, u32> = texels.iter().map(|&(f, p)| key(f, p)).zip(0..).collect();
-    texels
-        .iter()
-        .map(|&(face, p)| index[&key(map.face(face), map.point(p))])
-        .collect()
+    texel_permutation::texel_permutation(&texels, resolution, map)
 }

@@ -1,6 +1,7 @@
 //! Finds blocks that share a volume, by separating axes over candidate pairs.
 
-use crate::level::block::{Level, LevelError, OVERLAP_TOLERANCE};
+use crate::level::block::Level;
+use crate::level::error::{LevelError, OVERLAP_TOLERANCE};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;

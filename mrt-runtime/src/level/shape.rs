@@ -12,17 +12,17 @@ use std::f64::consts::PI;
 /// A unit cube some of whose faces are open, wholly or in part, or a tube in it.
 #[derive(Debug, PartialEq)]
 pub struct Shape {
-    /// Used in level files and on the command line.
+    /// Used in level and dictionary files.
     pub name: &'static str,
     /// What its walls are.
-    pub form: Form,
+    pub form: WallForm,
     /// Where light passes; at most one a face, in the order of [`Face::ALL`].
     pub openings: &'static [Aperture],
 }
 
 /// What the walls of a shape are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum WallForm {
     /// Faces of the cube.
     Cube,
     /// A round wall, in four charts named by the faces that it does not open through.
@@ -58,19 +58,19 @@ const DISC_CORNERS: usize = 32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hole {
     /// 0.4 wide, from the floor to 0.7: reaches down to the face's lower edge.
-    Door,
+    Doorway,
     /// 0.5 x 0.4, from 0.4 to 0.8 above the floor.
     Window,
 }
 
 impl Hole {
     /// All holes.
-    pub const ALL: [Hole; 2] = [Hole::Door, Hole::Window];
+    pub const ALL: [Hole; 2] = [Hole::Doorway, Hole::Window];
 
     /// The ranges of u and v on a side face.
     pub fn rectangle(self) -> [[f64; 2]; 2] {
         match self {
-            Hole::Door => [[0.3, 0.7], [0.0, 0.7]],
+            Hole::Doorway => [[0.3, 0.7], [0.0, 0.7]],
             Hole::Window => [[0.25, 0.75], [0.4, 0.8]],
         }
     }
@@ -86,7 +86,7 @@ impl std::fmt::Display for Outline {
         f.write_str(match self {
             Outline::Whole => "no wall",
             Outline::Disc => "a tube's end",
-            Outline::Hole(Hole::Door) => "a door",
+            Outline::Hole(Hole::Doorway) => "a doorway",
             Outline::Hole(Hole::Window) => "a window",
         })
     }
@@ -137,7 +137,7 @@ const NEG_Y: Aperture = whole(Face::NegY);
 const POS_Y: Aperture = whole(Face::PosY);
 const NEG_Z: Aperture = whole(Face::NegZ);
 const POS_Z: Aperture = whole(Face::PosZ);
-const DOOR: Aperture = hole(Face::PosX, Hole::Door);
+const DOORWAY: Aperture = hole(Face::PosX, Hole::Doorway);
 const WINDOW: Aperture = hole(Face::PosX, Hole::Window);
 
 const fn disc(face: Face) -> Aperture {
@@ -150,7 +150,7 @@ const fn disc(face: Face) -> Aperture {
 const fn shape(name: &'static str, openings: &'static [Aperture]) -> Shape {
     Shape {
         name,
-        form: Form::Cube,
+        form: WallForm::Cube,
         openings,
     }
 }
@@ -158,7 +158,7 @@ const fn shape(name: &'static str, openings: &'static [Aperture]) -> Shape {
 const fn tube(name: &'static str, form: TubeForm, openings: &'static [Aperture]) -> Shape {
     Shape {
         name,
-        form: Form::Tube(form),
+        form: WallForm::Tube(form),
         openings,
     }
 }
@@ -177,9 +177,9 @@ pub static SHAPES: [Shape; 16] = [
     shape("tee_up", &[NEG_X, POS_X, POS_Y, POS_Z]),
     shape("floor", &[NEG_X, POS_X, POS_Y, NEG_Z, POS_Z]),
     shape("open", &[NEG_X, POS_X, NEG_Y, POS_Y, NEG_Z, POS_Z]),
-    shape("door", &[DOOR]),
+    shape("door", &[DOORWAY]),
     shape("window", &[WINDOW]),
-    shape("doorway", &[NEG_X, DOOR]),
+    shape("doorway", &[NEG_X, DOORWAY]),
     shape("window_end", &[NEG_X, WINDOW]),
     tube(
         "tube",
@@ -240,7 +240,7 @@ pub fn shape_set(name: &str) -> Option<Vec<&'static Shape>> {
 
 /// The shapes that are cubes.
 pub fn cubes() -> impl Iterator<Item = &'static Shape> {
-    SHAPES.iter().filter(|shape| shape.form == Form::Cube)
+    SHAPES.iter().filter(|shape| shape.form == WallForm::Cube)
 }
 
 impl Shape {
@@ -252,8 +252,8 @@ impl Shape {
     /// The form of a tube; `None` for cubes.
     pub fn tube(&self) -> Option<TubeForm> {
         match self.form {
-            Form::Cube => None,
-            Form::Tube(form) => Some(form),
+            WallForm::Cube => None,
+            WallForm::Tube(form) => Some(form),
         }
     }
 

@@ -21,21 +21,22 @@
 //! transport = "regathered"     # or "rebuilt": operators made for this warp by `mrt adapt`
 //! ```
 
-use crate::level::block::{Block, Connection, Door, Level, LevelError, MAX_BLOCKS, Opening};
+use crate::level::block::{Block, Connection, Door, Level, MAX_BLOCKS, Opening};
+use crate::level::error::LevelError;
 use crate::level::shape::{SHAPES, Shape};
-use crate::modular::dictionary::WarpTransport;
+use crate::level::warp_transport::WarpTransport;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// The version that [`to_text`] writes.
+/// The version that [`Level::to_text`] writes.
 pub const LEVEL_VERSION: u32 = 1;
 
 const FORMAT: &str = "mrt-level";
 
-/// Bytes of text that [`from_text`] accepts: a block takes under 1,000.
+/// Bytes of text that [`Level::from_text`] accepts: a block takes under 1,000.
 pub const MAX_TEXT_BYTES: usize = MAX_BLOCKS * 1_000;
 
 /// Why text is not a level.
@@ -158,64 +159,92 @@ struct BlockText {
     transport: Option<String>,
 }
 
-/// Reads and checks a level.
-///
-/// # Errors
-/// [`LevelTextError`], with the place in the text where the parser knows it.
-pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
-    if text.len() > MAX_TEXT_BYTES {
-        return Err(LevelTextError::TooLong {
-            expected: MAX_TEXT_BYTES,
-            found: text.len(),
-        });
-    }
-    let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
-    // Format and version first, whatever keys another version has.
-    let header: Header = toml::from_str(text).map_err(malformed)?;
-    if header.format != FORMAT {
-        return Err(LevelTextError::NotALevel {
-            found: header.format,
-        });
-    }
-    if header.version != LEVEL_VERSION {
-        return Err(LevelTextError::UnsupportedVersion {
-            found: header.version,
-        });
-    }
-    let text: LevelText = toml::from_str(text).map_err(malformed)?;
-    let blocks = text
-        .blocks
-        .iter()
-        .enumerate()
-        .map(|(index, block)| read_block(index, block))
-        .collect::<Result<_, _>>()?;
-    let connections = text
-        .connections
-        .iter()
-        .enumerate()
-        .map(|(index, (a, a_face, b, b_face))| {
-            let end = |block: usize, face: &str| {
-                let face = read_face(face, || format!("connection {index}"))?;
-                Ok::<_, LevelTextError>(Opening { block, face })
-            };
-            Ok(Connection {
-                a: end(*a, a_face)?,
-                b: end(*b, b_face)?,
+impl Level {
+    /// Reads and checks a level.
+    ///
+    /// # Errors
+    /// [`LevelTextError`], with the place in the text where the parser knows it.
+    pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
+        if text.len() > MAX_TEXT_BYTES {
+            return Err(LevelTextError::TooLong {
+                expected: MAX_TEXT_BYTES,
+                found: text.len(),
+            });
+        }
+        let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
+        // Format and version first, whatever keys another version has.
+        let header: Header = toml::from_str(text).map_err(malformed)?;
+        if header.format != FORMAT {
+            return Err(LevelTextError::NotALevel {
+                found: header.format,
+            });
+        }
+        if header.version != LEVEL_VERSION {
+            return Err(LevelTextError::UnsupportedVersion {
+                found: header.version,
+            });
+        }
+        let text: LevelText = toml::from_str(text).map_err(malformed)?;
+        let blocks = text
+            .blocks
+            .iter()
+            .enumerate()
+            .map(|(index, block)| read_block(index, block))
+            .collect::<Result<_, _>>()?;
+        let connections = text
+            .connections
+            .iter()
+            .enumerate()
+            .map(|(index, (a, a_face, b, b_face))| {
+                let end = |block: usize, face: &str| {
+                    let face = read_face(face, || format!("connection {index}"))?;
+                    Ok::<_, LevelTextError>(Opening { block, face })
+                };
+                Ok(Connection {
+                    a: end(*a, a_face)?,
+                    b: end(*b, b_face)?,
+                })
             })
-        })
-        .collect::<Result<_, LevelTextError>>()?;
-    let doors = text
-        .doors
-        .iter()
-        .map(|&(connection, value)| Door { connection, value })
-        .collect();
-    let level = Level {
-        blocks,
-        connections,
-        doors,
-    };
-    level.check()?;
-    Ok(level)
+            .collect::<Result<_, LevelTextError>>()?;
+        let doors = text
+            .doors
+            .iter()
+            .map(|&(connection, value)| Door { connection, value })
+            .collect();
+        let level = Level {
+            blocks,
+            connections,
+            doors,
+        };
+        level.check()?;
+        Ok(level)
+    }
+
+    /// Writes a level; [`Level::from_text`] gives the same level back, to the last bit.
+    ///
+    /// # Errors
+    /// [`LevelTextError::Malformed`] if a value has no form in TOML.
+    pub fn to_text(&self) -> Result<String, LevelTextError> {
+        let text = LevelText {
+            format: FORMAT.to_owned(),
+            version: LEVEL_VERSION,
+            connections: self
+                .connections
+                .iter()
+                .map(|c| {
+                    let name = |face: Face| face.name().to_owned();
+                    (c.a.block, name(c.a.face), c.b.block, name(c.b.face))
+                })
+                .collect(),
+            doors: self
+                .doors
+                .iter()
+                .map(|door| (door.connection, door.value))
+                .collect(),
+            blocks: self.blocks.iter().map(write_block).collect(),
+        };
+        toml::to_string(&text).map_err(|error| LevelTextError::Malformed(error.to_string()))
+    }
 }
 
 /// The parser's message with its place, without the excerpt that it draws over several lines.
@@ -285,32 +314,6 @@ fn read_face(name: &str, place: impl FnOnce() -> String) -> Result<Face, LevelTe
     })
 }
 
-/// Writes a level; [`from_text`] gives the same level back, to the last bit.
-///
-/// # Errors
-/// [`LevelTextError::Malformed`] if a value has no form in TOML.
-pub fn to_text(level: &Level) -> Result<String, LevelTextError> {
-    let text = LevelText {
-        format: FORMAT.to_owned(),
-        version: LEVEL_VERSION,
-        connections: level
-            .connections
-            .iter()
-            .map(|c| {
-                let name = |face: Face| face.name().to_owned();
-                (c.a.block, name(c.a.face), c.b.block, name(c.b.face))
-            })
-            .collect(),
-        doors: level
-            .doors
-            .iter()
-            .map(|door| (door.connection, door.value))
-            .collect(),
-        blocks: level.blocks.iter().map(write_block).collect(),
-    };
-    toml::to_string(&text).map_err(|error| LevelTextError::Malformed(error.to_string()))
-}
-
 fn write_block(block: &Block) -> BlockText {
     let (min, max) = block.warp.bounds();
     let is_cuboid = Hexahedron::cuboid(min, max) == block.warp;
@@ -374,16 +377,16 @@ mod tests {
     #[test]
     fn text_keeps_every_bit() {
         let level = sample();
-        let text = to_text(&level).expect("writes");
-        assert_eq!(from_text(&text), Ok(level));
+        let text = level.to_text().expect("writes");
+        assert_eq!(Level::from_text(&text), Ok(level));
     }
 
     #[test]
     fn each_fault_has_its_error() {
-        let good = to_text(&sample()).expect("writes");
+        let good = sample().to_text().expect("writes");
         let fault = |from: &str, to: &str| {
             assert!(good.contains(from), "{from} is not in the text");
-            from_text(&good.replacen(from, to, 1)).expect_err("refused")
+            Level::from_text(&good.replacen(from, to, 1)).expect_err("refused")
         };
         assert!(matches!(
             fault("\"mrt-level\"", "\"bevy-scene\""),
@@ -423,11 +426,11 @@ mod tests {
             LevelTextError::Level(LevelError::InterfaceMismatch { .. })
         ));
         assert!(matches!(
-            from_text("format = "),
+            Level::from_text("format = "),
             Err(LevelTextError::Malformed(_))
         ));
         assert_eq!(
-            from_text("format = \"mrt-level\"\nversion = 1"),
+            Level::from_text("format = \"mrt-level\"\nversion = 1"),
             Err(LevelTextError::Level(LevelError::Empty))
         );
     }

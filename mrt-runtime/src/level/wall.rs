@@ -2,63 +2,9 @@
 //! section 6.1).
 
 use crate::level::shape::Shape;
-use glam::{DMat3, DVec3};
+use crate::level::wall_point::WallPoint;
+use glam::DVec3;
 use mrt_core::geometry::cube::Face;
-use mrt_core::geometry::hexahedron::Hexahedron;
-
-/// A point of a wall, in the unit cube.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WallPoint {
-    /// In the unit cube.
-    pub position: DVec3,
-    /// Unit normal into the block.
-    pub normal: DVec3,
-}
-
-impl WallPoint {
-    /// Unit normal into the block of the same point on the warped wall.
-    pub fn warped_normal(&self, warp: &Hexahedron) -> DVec3 {
-        // Gradients transform by the inverse transpose, which keeps their side of the wall.
-        let jacobian = warp.jacobian(self.position);
-        (jacobian.inverse().transpose() * self.normal).normalize()
-    }
-}
-
-/// From the world to the unit cube of a block.
-#[derive(Clone, Copy, Debug)]
-pub struct UnitFromWorld {
-    warp: Hexahedron,
-    /// Matrix and origin, if the warp is affine: one product, where Newton's method takes microseconds.
-    affine: Option<(DMat3, DVec3)>,
-}
-
-/// Corners this near to those of an affine map, in diagonals of the block, are its corners: a hundred roundings of
-/// coordinates at [`FAR_LIMIT`](crate::level::block::FAR_LIMIT).
-const AFFINE_TOLERANCE: f64 = 1e-10;
-
-impl UnitFromWorld {
-    /// The inverse of a warp.
-    pub fn new(warp: &Hexahedron) -> Self {
-        let jacobian = warp.jacobian(DVec3::splat(0.5));
-        let origin = warp.center() - jacobian * DVec3::splat(0.5);
-        let is_affine = (0..8).all(|k| {
-            let corner = origin + jacobian * Hexahedron::unit_corner(k);
-            corner.distance(warp.corners[k]) <= AFFINE_TOLERANCE * warp.diagonal()
-        });
-        Self {
-            warp: *warp,
-            affine: is_affine.then(|| (jacobian.inverse(), origin)),
-        }
-    }
-
-    /// The point of the unit cube, or beside it; its middle for points too far from a warped block.
-    pub fn point(&self, world: DVec3) -> DVec3 {
-        match self.affine {
-            Some((inverse, origin)) => inverse * (world - origin),
-            None => self.warp.inverse(world).unwrap_or(DVec3::splat(0.5)),
-        }
-    }
-}
 
 impl Shape {
     /// The point at (u, v) in [0, 1]² of a wall; the charts of a tube go on beyond [0, 1] in v, around it.
@@ -107,6 +53,7 @@ impl Shape {
 mod tests {
     use super::*;
     use crate::level::shape::SHAPES;
+    use mrt_core::geometry::hexahedron::Hexahedron;
 
     #[test]
     fn texels_are_where_their_uv_is() {

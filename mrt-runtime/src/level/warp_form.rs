@@ -6,7 +6,7 @@ use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Corners of a warp from the canonical cube, in the order of [`Hexahedron`]; see [`form_of`].
-pub type Form = [[f32; 3]; 8];
+pub type WarpForm = [[f32; 3]; 8];
 
 /// Coordinates of two forms that are the same differ by less than this, in diagonals of the block. Levels name
 /// corners in decimal and far from the origin, good to 1e-6 of a block; a texel at 16² is forty times as wide
@@ -18,7 +18,7 @@ pub const FORM_TOLERANCE: f32 = 1e-3;
 ///
 /// A cube has the same form in all of its 24 orientations, and so has every other box. A block that stands at
 /// another angle has a form of its own, since its probes have the level's axes.
-pub fn form_of(block: &Block) -> Form {
+pub fn form_of(block: &Block) -> WarpForm {
     let warp = block.canonical_warp();
     let back = block.orientation.inverse();
     let corners = warp
@@ -30,13 +30,13 @@ pub fn form_of(block: &Block) -> Form {
 }
 
 /// True if two forms differ by less than [`FORM_TOLERANCE`].
-pub fn same_form(a: &Form, b: &Form) -> bool {
+pub fn same_form(a: &WarpForm, b: &WarpForm) -> bool {
     let (a, b) = (a.as_flattened(), b.as_flattened());
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < FORM_TOLERANCE)
 }
 
 /// The form as a warp.
-pub fn warp_of(form: &Form) -> Hexahedron {
+pub fn warp_of(form: &WarpForm) -> Hexahedron {
     Hexahedron {
         corners: form.map(|corner| DVec3::from_array(corner.map(f64::from))),
     }

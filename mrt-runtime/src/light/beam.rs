@@ -9,16 +9,14 @@
 
 mod cone;
 
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::{Beyond, PlacedBlock, PlacedLevel};
 use crate::light::placed::PlacedLight;
-use crate::modular::scene::{Beyond, Scene, SceneBlock};
-use cone::{Cone, ON_PLANE, Scratch, Source, narrowed};
+
+use cone::{Cone, MAX_PLANES, ON_PLANE, Scratch, Source, narrowed};
 use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::TubeForm;
-
-/// Planes of a beam, at most. Openings of four corners give four, and more where crooked ones overlap; round ones
-/// are beyond it.
-pub const MAX_PLANES: usize = 16;
 
 /// Beams that wait to be followed, at most. One waits for each opening that was passed by on the way, so a straight
 /// corridor of any length needs one; a beam that enters an open hall of 300 x 300 blocks needs a few hundred.
@@ -28,7 +26,7 @@ const MAX_PENDING: usize = 1024;
 #[derive(Clone, Copy, Debug)]
 pub struct Beam {
     /// The block that it lights.
-    pub block: u32,
+    pub block: BlockIndex,
     /// The light's index, as given to [`BeamTracer::trace`].
     pub light: u32,
     /// Product of the values of the doors on the way, in (0, 1].
@@ -36,7 +34,7 @@ pub struct Beam {
     /// Where the planes have their origin, metres: the light, or a point of the block for directional lights.
     /// Differences from it keep their digits far from the world's origin.
     pub origin: Vec3,
-    /// Those beyond the count are anything.
+    /// Only the first `plane_count` entries are valid.
     planes: [[f32; 4]; MAX_PLANES],
     plane_count: u32,
     /// True if planes do not tell which points are lit: a bend or too many planes are on the way. The light's
@@ -63,11 +61,11 @@ impl PartialEq for Beam {
     }
 }
 
-/// Follows lights through the openings of one scene. Made once; tracing allocates nothing.
+/// Follows lights through the openings of one level. Made once; tracing allocates nothing.
 #[derive(Debug)]
 pub struct BeamTracer {
     /// Openings that lead outside: the block, and which of its portals.
-    outside: Vec<(u32, u32)>,
+    outside: Vec<(BlockIndex, u32)>,
     /// Beams to be followed further: the first [`BeamTracer::waiting`]. The others are kept for their memory.
     pending: Vec<Node>,
     waiting: usize,
@@ -85,7 +83,7 @@ pub struct BeamTracer {
 /// A beam on its way.
 #[derive(Clone, Debug)]
 struct Node {
-    block: u32,
+    block: BlockIndex,
     entered: Option<Face>,
     /// Openings passed.
     depth: u32,
@@ -95,7 +93,7 @@ struct Node {
 
 impl Node {
     const NEW: Node = Node {
-        block: 0,
+        block: BlockIndex::new(0),
         entered: None,
         depth: 0,
         fraction: 1.0,
@@ -112,29 +110,29 @@ impl Node {
 
 /// What one trace works on.
 struct Trace<'a> {
-    scene: &'a Scene,
+    level: &'a PlacedLevel,
     doors: &'a [f32],
     light: u32,
     /// The light's block.
-    home: Option<usize>,
+    home: Option<BlockIndex>,
     source: Source,
     emit: &'a mut dyn FnMut(&Beam),
 }
 
 impl BeamTracer {
-    /// Finds the scene's openings to the outside, and allocates what tracing needs: 0.6 kB for each of up to 1024
+    /// Finds the level's openings to the outside, and allocates what tracing needs: 0.6 kB for each of up to 1024
     /// beams, fewer in small scenes.
-    pub fn new(scene: &Scene) -> Self {
-        let openings = scene.blocks.iter().map(|block| block.portals.len()).sum();
+    pub fn new(level: &PlacedLevel) -> Self {
+        let openings = level.blocks.iter().map(|block| block.portals.len()).sum();
         let mut tracer = Self {
             outside: Vec::with_capacity(openings),
             // A cube has five openings besides the one entered, and the light's block six.
-            pending: Vec::with_capacity(MAX_PENDING.min(5 * scene.blocks.len() + 1)),
+            pending: Vec::with_capacity(MAX_PENDING.min(5 * level.blocks.len() + 1)),
             waiting: 0,
             node: Node::NEW,
             next: Node::NEW,
             beam: Beam {
-                block: 0,
+                block: BlockIndex::new(0),
                 light: 0,
                 fraction: 0.0,
                 origin: Vec3::ZERO,
@@ -143,20 +141,20 @@ impl BeamTracer {
                 exact: false,
             },
             scratch: Scratch::NEW,
-            exact: vec![0; scene.blocks.len()],
+            exact: vec![0; level.blocks.len()],
             trace: 0,
         };
-        tracer.restart(scene);
+        tracer.restart(level);
         tracer
     }
 
-    /// Goes on with another scene of as many blocks and openings; allocates nothing.
-    pub(crate) fn restart(&mut self, scene: &Scene) {
+    /// Goes on with another level of as many blocks and openings; allocates nothing.
+    pub(crate) fn restart(&mut self, level: &PlacedLevel) {
         self.outside.clear();
-        for (index, block) in scene.blocks.iter().enumerate() {
+        for (index, block) in level.blocks.iter().enumerate() {
             for (k, portal) in block.portals.iter().enumerate() {
                 if block.beyond[portal.face.index()] == Beyond::Outside {
-                    self.outside.push((index as u32, k as u32));
+                    self.outside.push((BlockIndex::new(index), k as u32));
                 }
             }
         }
@@ -171,24 +169,24 @@ impl BeamTracer {
     /// light is directional.
     ///
     /// # Panics
-    /// If the scene is another than the tracer's, or `doors` are not as many as its doors.
+    /// If the level is another than the tracer's, or `doors` are not as many as its doors.
     pub fn trace(
         &mut self,
-        scene: &Scene,
+        level: &PlacedLevel,
         light: u32,
         placed: &PlacedLight,
         doors: &[f32],
         emit: &mut dyn FnMut(&Beam),
     ) {
-        assert_eq!(self.exact.len(), scene.blocks.len(), "blocks of the scene");
-        assert_eq!(doors.len(), scene.doors.len(), "doors of the scene");
+        assert_eq!(self.exact.len(), level.blocks.len(), "blocks of the level");
+        assert_eq!(doors.len(), level.doors.len(), "doors of the level");
         self.start_marks();
         let (source, power) = Source::new(&placed.light);
         if power == Vec3::ZERO {
             return;
         }
         let mut trace = Trace {
-            scene,
+            level,
             doors,
             light,
             home: placed.block,
@@ -198,7 +196,7 @@ impl BeamTracer {
         match placed.block {
             Some(block) => {
                 self.next.copy_from(&Node::NEW);
-                self.next.block = block as u32;
+                self.next.block = block;
                 self.enter(&mut trace);
                 self.follow(&mut trace);
             }
@@ -221,8 +219,8 @@ impl BeamTracer {
         }
     }
 
-    fn enter_from_outside(&mut self, trace: &mut Trace<'_>, index: u32, portal: u32) {
-        let block = &trace.scene.blocks[index as usize];
+    fn enter_from_outside(&mut self, trace: &mut Trace<'_>, index: BlockIndex, portal: u32) {
+        let block = &trace.level.blocks[index.get()];
         let portal = &block.portals[portal as usize];
         if trace
             .source
@@ -246,14 +244,14 @@ impl BeamTracer {
 
     /// Follows everything that is pending.
     fn follow(&mut self, trace: &mut Trace<'_>) {
-        let scene = trace.scene;
+        let level = trace.level;
         while self.waiting > 0 {
             self.waiting -= 1;
             self.node.copy_from(&self.pending[self.waiting]);
-            let block = &scene.blocks[self.node.block as usize];
+            let block = &level.blocks[self.node.block.get()];
             // As far as a line that enters each block at most once can get.
             if self.node.depth as usize + 1
-                >= scene.blocks.len() + usize::from(trace.home.is_none())
+                >= level.blocks.len() + usize::from(trace.home.is_none())
             {
                 continue;
             }
@@ -274,14 +272,17 @@ impl BeamTracer {
                 };
                 let fraction = node.fraction * value;
                 // The far side's outline is the one that receivers beyond it ask.
-                let beyond = scene.blocks[next].portals.iter().find(|p| p.face == face);
+                let beyond = level.blocks[next.get()]
+                    .portals
+                    .iter()
+                    .find(|p| p.face == face);
                 let Some(beyond) = beyond.filter(|_| fraction > 0.0) else {
                     continue;
                 };
                 let (source, depth, scratch) = (&trace.source, node.depth, &mut self.scratch);
                 let to = &mut self.next;
                 if narrowed(&node.cone, source, beyond, depth, scratch, &mut to.cone) {
-                    (to.block, to.entered) = (next as u32, Some(face));
+                    (to.block, to.entered) = (next, Some(face));
                     (to.depth, to.fraction) = (depth + 1, fraction);
                     self.enter(trace);
                 }
@@ -295,7 +296,7 @@ impl BeamTracer {
         if node.fraction <= 0.0 {
             return;
         }
-        let block = &trace.scene.blocks[node.block as usize];
+        let block = &trace.level.blocks[node.block.get()];
         if trace.source.misses(block) || !beam_in(block, &trace.source, node, &mut self.beam) {
             return;
         }
@@ -315,8 +316,8 @@ impl BeamTracer {
         } else {
             // More than fits is yet to be lit, and receivers find out by themselves what is.
             self.waiting = 0;
-            for block in 0..trace.scene.blocks.len() as u32 {
-                self.beam.block = block;
+            for block in 0..trace.level.blocks.len() {
+                self.beam.block = BlockIndex::new(block);
                 self.beam.exact = true;
                 self.give(trace);
             }
@@ -325,7 +326,7 @@ impl BeamTracer {
 
     fn give(&mut self, trace: &mut Trace<'_>) {
         let beam = &self.beam;
-        let mark = &mut self.exact[beam.block as usize];
+        let mark = &mut self.exact[beam.block.get()];
         if *mark != self.trace {
             if beam.exact {
                 *mark = self.trace;
@@ -339,7 +340,7 @@ impl BeamTracer {
 /// one. Which light's it is, is left alone.
 ///
 /// The image of a trilinear map is in the hull of its corners, and so is a tube in its cube.
-fn beam_in(block: &SceneBlock, source: &Source, node: &Node, beam: &mut Beam) -> bool {
+fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -> bool {
     let origin = match source.toward {
         None => source.origin,
         Some(_) => block.warp.corners[0],
@@ -378,15 +379,16 @@ fn beam_in(block: &SceneBlock, source: &Source, node: &Node, beam: &mut Beam) ->
 mod tests {
     use super::*;
     use crate::level::block::Level;
-    use crate::light::placed::{Light, place};
-    use crate::modular::assemble::{AssembleConfig, assemble};
+    use crate::light::placed::place;
+    use crate::light::source::Light;
+    use crate::modular::assemble::config::AssembleConfig;
     use crate::modular::dictionary::Dictionary;
-    use mrt_core::container::ByteBudget;
+    use crate::modular::scene::Scene;
 
     /// A room of `width` by `width` cells.
     fn room(width: i32) -> Scene {
         let bytes = include_bytes!("../../../assets/versions/2.mrt");
-        let dictionary = Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20));
+        let dictionary = Dictionary::from_bytes(bytes);
         let cells: Vec<[i32; 3]> = (0..width * width)
             .map(|k| [k % width, 0, k / width])
             .collect();
@@ -395,7 +397,7 @@ mod tests {
             max_depth: 1,
             ..AssembleConfig::default()
         };
-        assemble(&level, &dictionary.expect("sound"), &config).expect("the cells' shapes")
+        Scene::assemble(&level, &dictionary.expect("sound"), &config).expect("the cells' shapes")
     }
 
     fn lamp(scene: &Scene, position: Vec3) -> PlacedLight {
@@ -404,18 +406,18 @@ mod tests {
             radius: 0.1,
             intensity: Vec3::ONE,
         };
-        place(scene, 0, light).expect("inside")
+        place(&scene.level, light).expect("inside")
     }
 
     #[test]
     fn where_too_many_beams_wait_receivers_are_asked() {
         let scene = room(5);
         let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
-        let mut tracer = BeamTracer::new(&scene);
+        let mut tracer = BeamTracer::new(&scene.level);
         tracer.pending = Vec::with_capacity(1);
         let mut exact = vec![0; 25];
-        tracer.trace(&scene, 0, &light, &[], &mut |beam| {
-            exact[beam.block as usize] += usize::from(beam.exact);
+        tracer.trace(&scene.level, 0, &light, &[], &mut |beam| {
+            exact[beam.block.get()] += usize::from(beam.exact);
         });
         assert_eq!(exact, [1; 25]);
     }
@@ -426,11 +428,11 @@ mod tests {
         for width in [10, 40] {
             let scene = room(width);
             let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
-            let mut tracer = BeamTracer::new(&scene);
+            let mut tracer = BeamTracer::new(&scene.level);
             let most = 2 * width as usize;
             tracer.pending = Vec::with_capacity(most);
             let mut beams = 0;
-            tracer.trace(&scene, 0, &light, &[], &mut |beam| {
+            tracer.trace(&scene.level, 0, &light, &[], &mut |beam| {
                 assert!(!beam.exact, "more than {most} were waiting");
                 beams += 1;
             });

@@ -3,24 +3,43 @@
 //! [`irradiance`] is the reference, one point at a time and with any shadows; `add_beam` does a whole block with
 //! vector instructions.
 
-mod add_beam;
+pub mod add_beam;
 
-pub use add_beam::{TexelPlanes, add_beam};
-
-use crate::light::placed::{Light, PlacedLight};
-use crate::light::visibility::{Openings, Receiver, Toward, Visibility};
-use crate::modular::scene::Scene;
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::PlacedLevel;
+use crate::light::direct_light::add_beam::TexelPlanes;
+use crate::light::limits::MIN_RADIUS;
+use crate::light::placed::PlacedLight;
+use crate::light::source::Light;
+use crate::light::visibility::{Receiver, Toward, Visibility};
 use glam::{DVec3, Vec3};
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 
+/// What shadows depend on: where walls and openings are, how far doors are open, and who decides.
+#[derive(Debug)]
+pub struct Shadows<'a, V> {
+    /// Blocks and openings.
+    pub level: &'a PlacedLevel,
+    /// Fraction of light that each door lets through.
+    pub doors: &'a [f32],
+    /// Who decides.
+    pub visibility: &'a V,
+}
+
+impl<V> Clone for Shadows<'_, V> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<V> Copy for Shadows<'_, V> {}
+
 /// Irradiance, W/m² per channel, from one light at one point of a surface with unit `normal`.
 pub fn irradiance<V: Visibility>(
-    scene: &Scene,
+    shadows: Shadows<'_, V>,
     placed: &PlacedLight,
-    doors: &[f32],
     receiver: Receiver,
     normal: DVec3,
-    visibility: &V,
 ) -> Vec3 {
     let (toward, unshadowed) = match (placed.light, placed.block) {
         (
@@ -64,13 +83,14 @@ pub fn irradiance<V: Visibility>(
             let factor = cone * bounded_irradiance(offset, normal, radius);
             (Toward::Point { position, block }, intensity * factor)
         }
-        // Lights with a position always have a block; see `light::place`.
+        // A light that is off.
         _ => return Vec3::ZERO,
     };
     if unshadowed == Vec3::ZERO {
         return Vec3::ZERO;
     }
-    let fraction = visibility.fraction(scene, doors, receiver, toward);
+    let visibility = shadows.visibility;
+    let fraction = visibility.fraction(shadows.level, shadows.doors, receiver, toward);
     // Callers' functions may return anything: what is not a positive number lets no light through.
     if fraction > 0.0 {
         unshadowed * fraction.min(1.0)
@@ -79,41 +99,37 @@ pub fn irradiance<V: Visibility>(
     }
 }
 
-/// Adds one light's irradiance in a block, found texel by texel with the shadows of `Openings`: what an
+/// Adds one light's irradiance in a block, asking for the shadow of each texel by itself: what an
 /// [exact](crate::light::beam::Beam::exact) beam asks for.
 ///
-/// `place` is the block's in the scene's [`Layout`](crate::modular::scene::Layout); `out` has red, green and blue, one value a slot.
-/// Cost: up to microseconds a texel.
+/// `out` has red, green and blue, one value a slot, as long as the texels' slices. Cost: up to microseconds a texel.
 ///
 /// # Panics
-/// If the block has more slots than `out`.
-pub fn add_exact(
-    scene: &Scene,
-    place: usize,
+/// If the slices differ in length.
+pub fn add_exact<V: Visibility>(
+    shadows: Shadows<'_, V>,
+    block: BlockIndex,
+    texels: &TexelPlanes<'_>,
     light: &PlacedLight,
-    doors: &[f32],
     out: [&mut [f32]; 3],
 ) {
-    let slots = scene.layout.slots[place].clone();
-    let block = scene.layout.order[place] as usize;
     let [red, green, blue] = out;
-    for slot in 0..slots.len() {
-        let normal = scene.surface.normals.get(slots.start + slot).as_dvec3();
+    let vector = |planes: &[&[f32]; 3], slot: usize| {
+        Vec3::new(planes[0][slot], planes[1][slot], planes[2][slot]).as_dvec3()
+    };
+    for slot in 0..red.len() {
+        let normal = vector(&texels.normals, slot);
         if normal == DVec3::ZERO {
             continue;
         }
-        let position = scene.surface.positions.get(slots.start + slot).as_dvec3();
+        let position = vector(&texels.positions, slot);
         let receiver = Receiver { block, position };
-        let found = irradiance(scene, light, doors, receiver, normal, &Openings);
+        let found = irradiance(shadows, light, receiver, normal);
         red[slot] += found.x;
         green[slot] += found.y;
         blue[slot] += found.z;
     }
 }
-
-/// Distance, metres, below which a light of smaller radius no longer gets brighter: it keeps products
-/// with the brightest light finite in `f32`.
-pub(crate) const MIN_RADIUS: f64 = 1e-6;
 
 fn bounded_irradiance(offset: DVec3, normal: DVec3, radius: f32) -> f32 {
     sphere_light_irradiance(offset, normal, f64::from(radius).max(MIN_RADIUS)) as f32

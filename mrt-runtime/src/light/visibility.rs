@@ -1,6 +1,7 @@
 //! Shadows of direct light: by the level's openings, or by rays of the caller's.
 
-use crate::modular::scene::{Beyond, Portal, Scene, SceneBlock};
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::{Beyond, PlacedBlock, PlacedLevel, Portal};
 use glam::DVec3;
 use mrt_core::geometry::tube::TubeForm;
 
@@ -8,7 +9,7 @@ use mrt_core::geometry::tube::TubeForm;
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
     /// The block that it belongs to.
-    pub block: usize,
+    pub block: BlockIndex,
     /// World position, metres.
     pub position: DVec3,
 }
@@ -21,7 +22,7 @@ pub enum Toward {
         /// World position, metres.
         position: DVec3,
         /// The block that it stands in.
-        block: usize,
+        block: BlockIndex,
     },
     /// A light at infinity; the unit vector points to it.
     Infinity(DVec3),
@@ -29,9 +30,15 @@ pub enum Toward {
 
 /// Decides what part of a light reaches a point.
 pub trait Visibility: Sync {
-    /// Fraction in [0, 1] of the light that arrives, with the value of each of [`Scene::doors`]; what is more
+    /// Fraction in [0, 1] of the light that arrives, with the value of each of [`PlacedLevel::doors`]; what is more
     /// counts as 1, NaN as 0.
-    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32;
+    fn fraction(
+        &self,
+        level: &PlacedLevel,
+        doors: &[f32],
+        receiver: Receiver,
+        toward: Toward,
+    ) -> f32;
 
     /// Another number whenever answers may differ from those before: with the same one, frames keep what they know.
     /// `None`, the default, makes them ask for every block in every frame.
@@ -51,8 +58,14 @@ pub trait Visibility: Sync {
 pub struct Openings;
 
 impl Visibility for Openings {
-    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
-        through_openings(scene, doors, receiver, toward)
+    fn fraction(
+        &self,
+        level: &PlacedLevel,
+        doors: &[f32],
+        receiver: Receiver,
+        toward: Toward,
+    ) -> f32 {
+        through_openings(level, doors, receiver, toward)
     }
 
     fn version(&self) -> Option<u64> {
@@ -76,7 +89,7 @@ pub struct Rays<F>(pub F);
 pub const RAY_REACH: f64 = 1e6;
 
 impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
-    fn fraction(&self, _: &Scene, _: &[f32], receiver: Receiver, toward: Toward) -> f32 {
+    fn fraction(&self, _: &PlacedLevel, _: &[f32], receiver: Receiver, toward: Toward) -> f32 {
         let target = match toward {
             Toward::Point { position, .. } => position,
             Toward::Infinity(direction) => receiver.position + direction * RAY_REACH,
@@ -86,7 +99,7 @@ impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
 }
 
 /// [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that moves now and then.
-/// With [`FrameConfig::slice`](crate::modular::frame::FrameConfig), the rays of a change are spread over frames.
+/// With [`FrameConfig::slice`](crate::modular::frame::config::FrameConfig), the rays of a change are spread over frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Versioned<V> {
     /// Who is asked.
@@ -96,8 +109,14 @@ pub struct Versioned<V> {
 }
 
 impl<V: Visibility> Visibility for Versioned<V> {
-    fn fraction(&self, scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
-        self.visibility.fraction(scene, doors, receiver, toward)
+    fn fraction(
+        &self,
+        level: &PlacedLevel,
+        doors: &[f32],
+        receiver: Receiver,
+        toward: Toward,
+    ) -> f32 {
+        self.visibility.fraction(level, doors, receiver, toward)
     }
 
     fn version(&self) -> Option<u64> {
@@ -113,7 +132,7 @@ impl<V: Visibility> Visibility for Versioned<V> {
 /// straight if the warp is affine; for other warps its ends are exact. A line
 /// that leaves through an opening to the outside reaches lights at infinity, even if other blocks of the
 /// level stand further on.
-fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
+fn through_openings(level: &PlacedLevel, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
     let (direction, goal) = match toward {
         Toward::Point { position, block } => (position - receiver.position, Some(block)),
         Toward::Infinity(direction) => (direction, None),
@@ -123,13 +142,13 @@ fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: To
     let mut from = receiver.position;
     let mut passed = 1.0;
     // A straight line enters each convex block at most once.
-    for _ in 0..scene.blocks.len() {
+    for _ in 0..level.blocks.len() {
         if Some(here) == goal {
             let to = receiver.position + direction;
-            let is_lit = is_free_inside(&scene.blocks[here], from, to);
+            let is_lit = is_free_inside(&level.blocks[here.get()], from, to);
             return if is_lit { passed } else { 0.0 };
         }
-        let block = &scene.blocks[here];
+        let block = &level.blocks[here.get()];
         let exit = block.portals.iter().find(|portal| {
             Some(portal.face) != entered && leaves_through(portal, receiver.position, direction)
         });
@@ -158,7 +177,7 @@ fn through_openings(scene: &Scene, doors: &[f32], receiver: Receiver, toward: To
 }
 
 /// True if no wall of a bend is between two points of its block, in metres.
-fn is_free_inside(block: &SceneBlock, from: DVec3, to: DVec3) -> bool {
+fn is_free_inside(block: &PlacedBlock, from: DVec3, to: DVec3) -> bool {
     match block.shape.tube() {
         Some(form @ TubeForm::Bend) => {
             // Texels and lights are on the wall up to the rounding of their positions in the level.

@@ -1,452 +1,163 @@
 //! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
 //!
-//! Cost follows what is lit and what changed, not what is loaded. A block that no light reaches is not touched; one
-//! whose radiosity is what it was keeps its coefficients, and blocks that none of the changed ones sends light to keep
-//! their light. Everything kept has the bits that computing it again would give ([`FrameConfig::tolerance`] allows more).
+//! Cost follows what is lit and what changed, not what is loaded. A block that no light reaches is not touched. A block
+//! whose radiosity did not change keeps its coefficients, and blocks that no changed block sends light to keep their
+//! light. Everything kept has the bits that computing it again would give ([`FrameConfig::tolerance`] allows more).
 
-mod blocks;
-mod config;
+pub mod config;
+pub mod error;
+pub mod light_list;
+pub mod report;
+pub mod stage_clock;
+pub mod surface;
+mod bounce;
 mod direct_stage;
-mod kernels;
-mod limit;
-mod pass;
+mod flux_limit;
+mod light_buffers;
+mod outputs;
+mod schedule;
+mod split;
 mod tasks;
 
-use crate::executor::MAX_TASKS;
-use crate::light::placed::{Light, LightError, MAX_LIGHT_VALUE, place};
-use crate::light::visibility::Visibility;
-use crate::modular::scene::{Layout, Planes, Scene};
-use crate::output::probes::Probes;
-use blocks::Blocks;
-pub use config::{Bounces, FrameConfig, Outputs};
-use direct_stage::DirectStage;
+use crate::level::block_index::BlockIndex;
+use crate::light::direct_light::Shadows;
+use crate::light::limits::MAX_LIGHT_VALUE;
+use crate::light::source::Light;
+use crate::light::visibility::{Openings, Visibility};
+use crate::modular::frame::bounce::BounceStage;
+use crate::modular::frame::config::{Bounces, FrameConfig};
+use crate::modular::frame::direct_stage::{DirectJob, DirectStage};
+use crate::modular::frame::error::FrameError;
+use crate::modular::frame::light_buffers::LightBuffers;
+use crate::modular::frame::light_list::{LightId, LightList};
+use crate::modular::frame::outputs::OutputBuffers;
+use crate::modular::frame::report::{FrameReport, FrameWork, ReportSlot};
+use crate::modular::frame::schedule::Schedule;
+use crate::modular::frame::stage_clock::{Stage, StageClock};
+use crate::modular::frame::surface::{Surface, SurfaceError};
+use crate::modular::scene::Scene;
+use crate::output::lightmap::Lightmap;
+use crate::output::probe_order::PROBE_COEFFICIENTS;
+use crate::output::probes::{Probes, irradiance_from_probe};
 use glam::Vec3;
-pub(crate) use kernels::{Expand, Scratch};
 use mrt_core::lighting::hemisphere_sh::evaluate_f32;
-use mrt_core::simd::Aligned;
-use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::num::NonZero;
 
-/// Lights in one frame, at most.
-pub const MAX_LIGHTS: usize = 1024;
-
-/// Passes in one frame, at most: at albedo 0.99 the light left after them is 1e-18 of the first.
-pub const MAX_PASSES: u32 = 4096;
-
-/// Time of each stage of the last frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageTimes {
-    /// Direct light.
-    pub direct: Duration,
-    /// `b = T_d->b l`.
-    pub coefficients: Duration,
-    /// `r = T_b->r b`.
-    pub responses: Duration,
-    /// Irradiance from the joint basis, `U_b b + U_r r`.
-    pub indirect: Duration,
-    /// Lightmap atlas.
-    pub atlas: Duration,
-    /// Probes, if asked for.
-    pub probes: Duration,
-    /// Vector irradiance, if asked for.
-    pub vector: Duration,
-}
-
-/// Blocks that the last frame worked on, each once a pass.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct FrameWork {
-    /// Blocks whose direct light was computed.
-    pub direct: usize,
-    /// Blocks whose coefficients b were computed.
-    pub sources: usize,
-    /// Blocks whose indirect light was computed.
-    pub targets: usize,
-    /// Blocks that changed light was sent to and whose light stays what it was: it changes by no more than
-    /// [`FrameConfig::tolerance`].
-    pub kept: usize,
-    /// Channels that were scaled down, as more light arrived in them than left: then the next frame computes all anew.
-    pub limited: usize,
-}
-
-impl StageTimes {
-    /// Sum over the stages.
-    pub fn total(&self) -> Duration {
-        self.direct
-            + self.coefficients
-            + self.responses
-            + self.indirect
-            + self.atlas
-            + self.probes
-            + self.vector
-    }
-}
-
-/// The buffers of a frame, made once for a scene; frames allocate nothing (what a caller's
-/// [`Executor`](crate::executor::Executor) does aside, and the first frame of another scene with probes).
+/// The light of a scene, frame by frame.
 ///
-/// [`Frame::direct`], [`Frame::indirect`] and [`Frame::coefficients`] give signals block by block in the level's order, in
-/// a block channel by channel (red, green, blue), and in a channel texel by texel in the canonical shape's order. They
-/// copy; games read the lightmap, probes or [`Frame::indirect_at`].
+/// It keeps its [`Scene`], and owns what changes while a game runs: lights, doors, what walls reflect and emit, and the
+/// buffers of every stage. Frames allocate nothing, what a caller's [`Executor`](crate::executor::Executor) does aside,
+/// as long as the [`FrameReport`] of the frame before has been dropped.
+///
+/// Signals that are copied out are block by block in the level's order, in a block channel by channel (red, green, blue),
+/// in a channel texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).
 #[derive(Debug)]
 pub struct Frame {
+    scene: Scene,
     config: FrameConfig,
-    layout: Arc<Layout>,
-    /// [`Surface::revision`](crate::modular::scene::Surface) of the scene that the buffers hold the light of.
-    revision: u64,
-    lights: DirectStage,
-    direct: Planes,
-    indirect: Planes,
-    coefficients: Aligned<f32>,
-    joint: Aligned<f32>,
-    doors: Vec<f32>,
-    gate_values: Vec<f32>,
-    blocks: Blocks,
-    scratch: Vec<Scratch>,
-    lightmap: Vec<[f32; 3]>,
-    atlas_size: usize,
-    probes: Option<Probes>,
-    vector: Vec<f32>,
-    times: StageTimes,
-    work: FrameWork,
-    passes: u32,
-}
-
-/// Why a frame was not computed; its results are those of the frame before.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum FrameError {
-    /// A light is refused.
-    #[error(transparent)]
-    Light(#[from] LightError),
-    /// Above [`MAX_LIGHTS`].
-    #[error("the frame has {found} lights; expected at most {MAX_LIGHTS}")]
-    TooManyLights {
-        /// Lights given.
-        found: usize,
-    },
-    /// Direct light from the caller has the wrong length, or values that are no irradiance.
-    #[error(
-        "direct light has {found} values, the first that is no irradiance at {faulty:?}; expected \
-         {expected} values in [0, {MAX_LIGHT_VALUE}]"
-    )]
-    Direct {
-        /// Three values a texel.
-        expected: usize,
-        /// Values given.
-        found: usize,
-        /// Position of the first that is negative, too large or NaN.
-        faulty: Option<usize>,
-    },
-    /// No such door, or not a value for one.
-    #[error("door {door} is set to {found}; expected one of {count} doors and a value in [0, 1]")]
-    Door {
-        /// The door given.
-        door: usize,
-        /// Doors in the scene.
-        count: usize,
-        /// The value given.
-        found: f32,
-    },
-    /// The buffers were made for a scene of another size.
-    #[error("the frame's buffers hold {expected} {what}; the scene has {found}")]
-    OtherScene {
-        /// What there is another number of.
-        what: &'static str,
-        /// Those of the scene that the buffers were made for.
-        expected: usize,
-        /// Those of the scene given.
-        found: usize,
-    },
+    lights: LightList,
+    surface: Surface,
+    direct_stage: DirectStage,
+    schedule: Schedule,
+    light: LightBuffers,
+    outputs: OutputBuffers,
+    report: ReportSlot,
 }
 
 impl Frame {
-    /// Buffers for frames of a scene, all dark, with irradiance and lightmap only.
-    pub fn new(scene: &Scene) -> Self {
-        Self::with_config(scene, FrameConfig::default())
-    }
-
-    /// Buffers for frames of a scene, all dark, with everything asked for that the dictionary was baked with.
-    pub fn with_outputs(scene: &Scene, outputs: Outputs) -> Self {
-        let config = FrameConfig {
-            outputs,
-            ..FrameConfig::default()
-        };
-        Self::with_config(scene, config)
-    }
-
-    /// Buffers for frames of a scene, all dark.
-    pub fn with_config(scene: &Scene, config: FrameConfig) -> Self {
-        let layout = &scene.layout;
-        let blocks = layout.block_count();
-        let slots = layout.slots.iter().map(|range| range.len()).max();
-        let slots = slots.unwrap_or(0);
-        let coefficients = 3 * layout.rows;
-        let tasks = match config.executor.workers() {
-            0 | 1 => 1,
-            _ => MAX_TASKS,
-        };
-        let outputs = config.outputs;
-        let atlas_size = scene.atlas.width * scene.atlas.height;
+    /// A dark frame of a scene. Of the outputs asked for, those come that the dictionary was baked with.
+    pub fn new(scene: &Scene, config: FrameConfig) -> Self {
+        let tasks = LightBuffers::task_count(config.executor.workers());
+        let (surface, emits) = Surface::new(scene);
         Self {
-            layout: layout.clone(),
-            revision: 0,
-            lights: DirectStage::new(scene, tasks, slots),
-            direct: Planes::new(layout.slot_count()),
-            indirect: Planes::new(layout.slot_count()),
-            coefficients: Aligned::zeroed(coefficients * blocks),
-            joint: Aligned::zeroed(coefficients * blocks),
-            doors: scene.doors.clone(),
-            gate_values: vec![0.0; scene.transport.gates.len()],
-            blocks: Blocks::new(blocks, scene.atlas.tile_list_size()),
-            scratch: vec![Scratch::new(slots, coefficients); tasks],
-            lightmap: if outputs.lightmap {
-                vec![[0.0; 3]; atlas_size]
-            } else {
-                Vec::new()
-            },
-            atlas_size,
-            probes: outputs.probes.and_then(|order| Probes::new(scene, order)),
-            vector: if outputs.vector && scene.has_vector() {
-                vec![0.0; 12 * scene.texel_count()]
-            } else {
-                Vec::new()
-            },
-            times: StageTimes::default(),
-            work: FrameWork::default(),
-            passes: 0,
+            lights: LightList::new(),
+            surface,
+            direct_stage: DirectStage::new(scene, tasks),
+            schedule: Schedule::new(&emits),
+            light: LightBuffers::new(scene, tasks),
+            outputs: OutputBuffers::new(scene, &config),
+            report: ReportSlot::new(scene.level.blocks.len(), &scene.atlas),
+            scene: scene.clone(),
             config,
         }
     }
 
-    /// Computes direct and indirect irradiance for the lights.
-    ///
-    /// # Errors
-    /// [`FrameError`]; the frame then holds what it held before.
-    pub fn solve<V: Visibility>(
-        &mut self,
-        scene: &Scene,
-        lights: &[Light],
-        visibility: &V,
-        bounces: Bounces,
-    ) -> Result<(), FrameError> {
-        self.check(scene, lights)?;
-        let start = Instant::now();
-        self.begin(scene);
-        self.update_direct(scene, visibility, bounces);
-        self.times = StageTimes {
-            direct: start.elapsed(),
-            ..StageTimes::default()
-        };
-        self.bounce(scene, bounces);
-        self.fill_outputs(scene);
-        Ok(())
+    /// The scene that is lit.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
     }
 
-    /// As [`Frame::solve`], for direct irradiance that the caller computed, in this struct's order.
-    ///
-    /// # Errors
-    /// [`FrameError::OtherScene`] and [`FrameError::Direct`]; the frame then holds what it held before.
-    pub fn solve_from_direct(
-        &mut self,
-        scene: &Scene,
-        direct: &[f32],
-        bounces: Bounces,
-    ) -> Result<(), FrameError> {
-        self.check_scene(scene)?;
-        let faulty = direct
-            .iter()
-            .position(|e| !(0.0..=MAX_LIGHT_VALUE).contains(e));
-        let expected = 3 * scene.texel_count();
-        if direct.len() != expected || faulty.is_some() {
-            return Err(FrameError::Direct {
-                expected,
-                found: direct.len(),
-                faulty,
-            });
-        }
-        let start = Instant::now();
-        self.begin(scene);
-        self.work = FrameWork {
-            direct: scene.blocks.len(),
-            ..FrameWork::default()
-        };
-        self.take_direct(scene, direct);
-        self.times = StageTimes {
-            direct: start.elapsed(),
-            ..StageTimes::default()
-        };
-        self.bounce(scene, bounces);
-        self.fill_outputs(scene);
-        Ok(())
+    /// How frames are computed.
+    pub fn config(&self) -> &FrameConfig {
+        &self.config
     }
 
-    /// Lets the next frame compute everything anew, as if nothing were known: for measurements, and for callers that
-    /// changed what frames cannot see.
-    pub fn forget(&mut self) {
-        self.lights.forget();
-        self.blocks.all_stale = true;
+    /// Changes which bounces the next frame computes.
+    pub fn set_bounces(&mut self, bounces: Bounces) {
+        self.config.bounces = bounces;
     }
 
-    /// Forgets everything if the scene is not the one of the frame before, or has changed.
-    fn begin(&mut self, scene: &Scene) {
-        if self.revision == scene.surface.revision {
-            return;
-        }
-        self.revision = scene.surface.revision;
-        let same_blocks = Arc::ptr_eq(&self.layout, &scene.layout);
-        self.layout = scene.layout.clone();
-        self.direct.clear();
-        self.indirect.clear();
-        self.coefficients.fill(0.0);
-        self.joint.fill(0.0);
-        self.lightmap.fill([0.0; 3]);
-        self.vector.fill(0.0);
-        match &mut self.probes {
-            Some(probes) if same_blocks => probes.darken(),
-            // This allocates; surfaces that change do not come here.
-            Some(probes) => probes.restart(scene),
-            None => {}
-        }
-        self.lights.restart(scene);
-        self.blocks.restart(&scene.surface.emitting);
+    /// Changes [`FrameConfig::tolerance`], W/m².
+    pub fn set_tolerance(&mut self, tolerance: f32) {
+        self.config.tolerance = tolerance;
     }
 
-    fn fill_outputs(&mut self, scene: &Scene) {
-        let (level, executor) = (self.config.simd, &*self.config.executor);
-        self.blocks.changed.sort_unstable();
-        let changed = &self.blocks.changed;
-        let start = Instant::now();
-        if self.config.outputs.lightmap {
-            scene.atlas.fill(
-                changed,
-                &mut self.blocks.tiles,
-                &self.indirect,
-                &mut self.lightmap,
-                executor,
-            );
-        }
-        let after_atlas = Instant::now();
-        let joint = |place: usize| {
-            let size = 3 * self.layout.rows;
-            &self.joint[place * size..(place + 1) * size]
-        };
-        if let Some(probes) = &mut self.probes {
-            for &place in changed {
-                let place = place as usize;
-                let scratch = &mut self.scratch[0];
-                probes.fill(scene, place, level, joint(place), scratch);
-            }
-        }
-        let after_probes = Instant::now();
-        if !self.vector.is_empty() {
-            for &place in changed {
-                let place = place as usize;
-                let block = &scene.blocks[self.layout.order[place] as usize];
-                let out = &mut self.vector[12 * block.texels.start..12 * block.texels.end];
-                let (red, rest) = out.split_at_mut(4 * block.texels.len());
-                let (green, blue) = rest.split_at_mut(4 * block.texels.len());
-                let basis = &scene.shapes[block.shape_index].vector;
-                level.run(Expand {
-                    basis,
-                    rows: basis.rows,
-                    joint: joint(place),
-                    scratch: &mut self.scratch[0],
-                    out: [red, green, blue],
-                });
-            }
-        }
-        self.times.atlas = after_atlas - start;
-        self.times.probes = after_probes - after_atlas;
-        self.times.vector = after_probes.elapsed();
-        self.blocks.clear_changed();
+    /// Changes [`FrameConfig::slice`].
+    pub fn set_slice(&mut self, slice: Option<NonZero<usize>>) {
+        self.config.slice = slice;
+    }
+}
+
+/// Lights.
+impl Frame {
+    /// Adds a light, which shines from the next frame on. Any light is taken: one with absurd values, or in no block, is
+    /// skipped and named by [`FrameReport::skipped_lights`], as are all beyond
+    /// [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS).
+    pub fn add_light(&mut self, light: Light) -> LightId {
+        self.lights.add(&self.scene.level, light)
     }
 
-    fn check_scene(&self, scene: &Scene) -> Result<(), FrameError> {
-        // Doors and shapes may differ where the number of texels does not.
-        let pixels = scene.atlas.width * scene.atlas.height;
-        let slots = scene.shapes.iter().map(|shape| shape.folding.slots());
-        let (largest_block, largest_room) = (slots.max().unwrap_or(0), self.lights.slots());
-        for (what, expected, found) in [
-            ("texels", self.layout.texel_count(), scene.texel_count()),
-            ("blocks", self.layout.block_count(), scene.blocks.len()),
-            (
-                "texel slots",
-                self.direct.slots(),
-                scene.layout.slot_count(),
-            ),
-            (
-                "texel slots in a block",
-                largest_room,
-                largest_block.max(largest_room),
-            ),
-            (
-                "coefficients",
-                self.coefficients.len() / 3,
-                scene.layout.rows * scene.blocks.len(),
-            ),
-            (
-                "sets of doors that light passes",
-                self.gate_values.len(),
-                scene.transport.gates.len(),
-            ),
-            ("doors", self.doors.len(), scene.doors.len()),
-            (
-                "blocks with probes",
-                self.probes.as_ref().map_or(0, Probes::block_count),
-                self.probes.as_ref().map_or(0, |_| scene.blocks.len()),
-            ),
-            (
-                "probes along an edge",
-                self.probes.as_ref().map_or(0, Probes::per_axis),
-                self.probes.as_ref().map_or(0, |_| scene.probes),
-            ),
-            (
-                "texels with vector irradiance",
-                self.vector.len() / 12,
-                if self.vector.is_empty() || !scene.has_vector() {
-                    0
-                } else {
-                    scene.texel_count()
-                },
-            ),
-            ("lightmap pixels", self.atlas_size, pixels),
-        ] {
-            if found != expected {
-                return Err(FrameError::OtherScene {
-                    what,
-                    expected,
-                    found,
-                });
-            }
-        }
-        Ok(())
+    /// Moves or changes a light. False if it was removed before.
+    pub fn set_light(&mut self, id: LightId, light: Light) -> bool {
+        self.lights.set(&self.scene.level, id, light)
     }
 
-    fn check(&mut self, scene: &Scene, lights: &[Light]) -> Result<(), FrameError> {
-        self.check_scene(scene)?;
-        if lights.len() > MAX_LIGHTS {
-            return Err(FrameError::TooManyLights {
-                found: lights.len(),
-            });
-        }
-        self.lights.next.clear();
-        for (index, &light) in lights.iter().enumerate() {
-            self.lights.next.push(place(scene, index, light)?);
-        }
-        Ok(())
+    /// Removes a light and returns it; the others keep their ids and, where nothing else changes, their light.
+    pub fn remove_light(&mut self, id: LightId) -> Option<Light> {
+        self.lights.remove(&self.scene.level, id)
     }
 
-    /// Opens or closes a door for direct and indirect light ([`Rays`](crate::light::visibility::Rays) ask the caller's function
-    /// alone, which must know it): 1 lets everything through, 0 nothing; what does not pass is lost. The next
-    /// frame sees it.
+    /// Replaces all lights; ids given before name no light any more. For games that keep a list of their own: lights that
+    /// keep their place in it cost nothing if they did not change.
+    pub fn set_lights(&mut self, lights: &[Light]) {
+        self.lights.replace(&self.scene.level, lights);
+    }
+
+    /// A light; `None` if it was removed.
+    pub fn light(&self, id: LightId) -> Option<Light> {
+        self.lights.get(id)
+    }
+
+    /// Ids of all lights.
+    pub fn light_ids(&self) -> impl Iterator<Item = LightId> + '_ {
+        self.lights.ids()
+    }
+}
+
+/// What changes while a game runs.
+impl Frame {
+    /// Opens or closes a door, by its position in [`Level::doors`](crate::level::block::Level::doors), for direct and
+    /// indirect light: 1 lets everything through, 0 nothing; light that does not pass is lost. The next frame sees it.
+    /// [`Rays`](crate::light::visibility::Rays) ask the caller's function alone, which must know about doors.
     ///
     /// # Errors
     /// [`FrameError::Door`], if there is no such door or the value is not in [0, 1].
     pub fn set_door(&mut self, door: usize, value: f32) -> Result<(), FrameError> {
-        let count = self.doors.len();
-        match self.doors.get_mut(door) {
-            Some(place) if (0.0..=1.0).contains(&value) => {
-                self.blocks.doors_moved |= *place != value;
-                *place = value;
+        let count = self.light.doors.len();
+        match self.light.doors.get_mut(door) {
+            Some(now) if (0.0..=1.0).contains(&value) => {
+                self.schedule.doors_moved |= *now != value;
+                *now = value;
                 Ok(())
             }
             _ => Err(FrameError::Door {
@@ -457,95 +168,298 @@ impl Frame {
         }
     }
 
-    /// Value of each door.
+    /// How much light each door lets through.
     pub fn doors(&self) -> &[f32] {
-        &self.doors
+        &self.light.doors
     }
 
-    /// Direct irradiance, W/m².
-    pub fn direct(&self) -> Vec<f32> {
-        self.layout.by_texel(&self.direct)
-    }
-
-    /// Indirect irradiance, W/m², not multiplied by the receiving texel's albedo.
-    pub fn indirect(&self) -> Vec<f32> {
-        self.layout.by_texel(&self.indirect)
-    }
-
-    /// Indirect irradiance, RGB, of one texel of a block; the scene must be the one that was solved.
+    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels; texels
+    /// in holes keep none. The next frame sees it, and computes what it changes.
     ///
-    /// # Panics
-    /// If the scene has no such block or the block no such texel.
-    pub fn indirect_at(&self, scene: &Scene, block: usize, texel: usize) -> [f32; 3] {
-        let range = &scene.blocks[block].texels;
-        assert!(texel < range.len(), "texel {texel} of {}", range.len());
-        self.indirect.get(scene.slot_in(block, texel)).to_array()
+    /// # Errors
+    /// [`SurfaceError`], if there is no such block, if the number of values is not the number of texels, or if a value is
+    /// outside [0, 1]; nothing then changes.
+    pub fn set_texel_albedo(
+        &mut self,
+        block: BlockIndex,
+        albedo: &[Vec3],
+    ) -> Result<(), SurfaceError> {
+        let rank = self.surface.set_albedo(&self.scene, block, albedo)?;
+        self.schedule.touch(rank, f32::INFINITY);
+        Ok(())
     }
 
-    /// Coefficients b: block by block, channel by channel.
-    pub fn coefficients(&self) -> Vec<f32> {
-        let layout = &*self.layout;
-        let mut out = Vec::new();
-        for &place in &layout.rank {
-            let place = place as usize;
-            let rows = &layout.row_of_mode[layout.shapes[place] as usize];
-            for channel in 0..3 {
-                let start = (3 * place + channel) * layout.rows;
-                let of_block = &self.coefficients[start..start + layout.rows];
-                out.extend(rows.iter().map(|&row| of_block[usize::from(row)]));
+    /// Lets each texel of a block emit radiosity of its own, linear RGB, W/m², in the same order.
+    ///
+    /// # Errors
+    /// [`SurfaceError`], as for [`Frame::set_texel_albedo`], with values in [0, 1e9].
+    pub fn set_texel_emission(
+        &mut self,
+        block: BlockIndex,
+        emission: &[Vec3],
+    ) -> Result<(), SurfaceError> {
+        let rank = self.surface.set_emission(&self.scene, block, emission)?;
+        self.schedule.state[rank.get()].emits = emission.iter().any(|e| *e != Vec3::ZERO);
+        self.schedule.touch(rank, f32::INFINITY);
+        Ok(())
+    }
+
+    /// Linear RGB albedo of a texel of a block; `None` if there is no such block or texel.
+    pub fn texel_albedo(&self, block: BlockIndex, texel: usize) -> Option<Vec3> {
+        let slot = self.scene.layout.slot(block, texel)?;
+        Some(self.surface.albedo.get(slot))
+    }
+
+    /// Radiosity that a texel of a block emits of itself, linear RGB, W/m²; `None` if there is no such block or texel.
+    pub fn texel_emission(&self, block: BlockIndex, texel: usize) -> Option<Vec3> {
+        let slot = self.scene.layout.slot(block, texel)?;
+        Some(self.surface.emission.get(slot))
+    }
+
+    /// Goes on with another scene, such as the same level with blocks added or removed. Lights and their ids stay, and
+    /// light goes on where `old_block` names the block of the present scene that a block of the new one was, if both have
+    /// the same shape; all else starts dark, with the doors and colours of the new level.
+    ///
+    /// Allocates the buffers of the new scene.
+    pub fn change_scene(
+        &mut self,
+        scene: &Scene,
+        old_block: impl Fn(BlockIndex) -> Option<BlockIndex>,
+    ) {
+        let mut next = Frame::new(scene, self.config.clone());
+        std::mem::swap(&mut next.lights, &mut self.lights);
+        next.lights.place_in(&scene.level);
+        let (from, to) = (&self.scene, scene);
+        for (block, placed) in to.level.blocks.iter().enumerate() {
+            let block = BlockIndex::new(block);
+            let old = old_block(block).filter(|old| {
+                let old = from.level.block(*old);
+                old.is_some_and(|old| {
+                    old.shape == placed.shape && old.texels.len() == placed.texels.len()
+                })
+            });
+            let Some(old) = old else { continue };
+            let rank = to.layout.rank[block.get()];
+            let texel_of_slot = &to.layout.texel_of_slot[to.layout.shape(rank)];
+            for (slot, &texel) in to.layout.slots(rank).zip(texel_of_slot) {
+                if let Some(shown) = from.layout.slot(old, texel as usize) {
+                    let irradiance = self.light.indirect.get(shown);
+                    next.light.indirect.set(slot, irradiance);
+                }
+            }
+            let old = &self.schedule.state[from.layout.rank[old.get()].get()];
+            if old.has_indirect {
+                next.schedule.state[rank.get()].has_indirect = true;
+                next.schedule.touch(rank, f32::INFINITY);
             }
         }
-        out
+        *self = next;
     }
+}
 
-    /// Padded lightmap of indirect irradiance, row by row, see [`Scene::atlas`]; empty if not asked for.
-    pub fn lightmap(&self) -> &[[f32; 3]] {
-        &self.lightmap
-    }
-
-    /// Probes, if asked for and there are any.
-    pub fn probes(&self) -> Option<&Probes> {
-        self.probes.as_ref()
-    }
-
-    /// Vector irradiance, if asked for and there is any: block by block, in a block channel by channel, in a
-    /// channel texel by texel four coefficients of 1, v, normal and u in the texel's tangent frame.
-    /// [`mrt_core::lighting::hemisphere_sh::evaluate_f32`] gives irradiance for a normal.
-    pub fn vector(&self) -> &[f32] {
-        &self.vector
-    }
-
-    /// Indirect irradiance, RGB, at one texel of a block for a unit normal in the texel's tangent frame (along u,
-    /// along v, along the wall's normal); zero where truncation makes it negative, and without vector irradiance.
+/// Computing.
+impl Frame {
+    /// Computes direct and indirect irradiance. Shadows of direct light are those of walls and openings.
     ///
-    /// # Panics
-    /// If the scene has no such block or the block no such texel.
-    pub fn vector_at(&self, scene: &Scene, block: usize, texel: usize, normal: Vec3) -> [f32; 3] {
-        let range = &scene.blocks[block].texels;
-        assert!(texel < range.len(), "texel {texel} of {}", range.len());
-        if self.vector.is_empty() {
-            return [0.0; 3];
+    /// Nothing stops a frame: lights that cannot shine are skipped and named in the report.
+    pub fn solve(&mut self) -> FrameReport {
+        self.solve_with(&Openings)
+    }
+
+    /// As [`Frame::solve`], with shadows of direct light that the caller decides, such as rays into the real mesh.
+    pub fn solve_with<V: Visibility>(&mut self, visibility: &V) -> FrameReport {
+        let mut clock = StageClock::start();
+        let report = self.report.begin();
+        // 1. Lights that can shine.
+        self.lights.list_skipped(&mut report.skipped);
+        // 2. Direct light at texels.
+        let job = DirectJob {
+            scene: &self.scene,
+            config: &self.config,
+            shadows: Shadows {
+                level: &self.scene.level,
+                doors: &self.light.doors,
+                visibility,
+            },
+            lights: self.lights.placed(),
+            most: blocks_at_most(&self.config),
+        };
+        let direct = &mut self.light.direct;
+        report.work = FrameWork {
+            direct: self.direct_stage.update(&job, direct, &mut self.schedule),
+            ..FrameWork::default()
+        };
+        clock.lap(Stage::Direct);
+        // 3. Bounces, and 4. what is shown of them.
+        self.finish(clock)
+    }
+
+    /// As [`Frame::solve`], for direct irradiance that the caller computed, W/m², in the order of
+    /// [`Frame::copy_indirect_to`].
+    ///
+    /// # Errors
+    /// [`FrameError::Direct`]; the frame is then as it was.
+    pub fn solve_from_direct(&mut self, direct: &[f32]) -> Result<FrameReport, FrameError> {
+        let mut clock = StageClock::start();
+        let is_irradiance = |e: &f32| (0.0..=MAX_LIGHT_VALUE).contains(e);
+        let faulty = direct.iter().position(|e| !is_irradiance(e));
+        let expected = 3 * self.scene.texel_count();
+        if direct.len() != expected || faulty.is_some() {
+            return Err(FrameError::Direct {
+                expected,
+                found: direct.len(),
+                faulty,
+            });
+        }
+        let report = self.report.begin();
+        report.work = FrameWork {
+            direct: self.scene.level.blocks.len(),
+            ..FrameWork::default()
+        };
+        let planes = &mut self.light.direct;
+        self.direct_stage
+            .take_from_caller(&self.scene, direct, planes, &mut self.schedule);
+        clock.lap(Stage::Direct);
+        Ok(self.finish(clock))
+    }
+
+    /// Bounces the direct light there is, and fills outputs and report.
+    fn finish(&mut self, mut clock: StageClock) -> FrameReport {
+        let report = self.report.data();
+        let mut bounces = BounceStage {
+            scene: &self.scene,
+            config: &self.config,
+            surface: &self.surface,
+            schedule: &mut self.schedule,
+            light: &mut self.light,
+            work: &mut report.work,
+            clock: &mut clock,
+            direct_waits: self.direct_stage.has_waiting(),
+        };
+        report.passes = bounces.run();
+        if report.passes == 0 {
+            // Where truncation leaves walls dark, probes may still hold a little light, and no list knows of it.
+            self.outputs.darken();
+        }
+        self.outputs.fill(
+            &self.scene,
+            &self.config,
+            &mut self.schedule,
+            &mut self.light,
+            report,
+            &mut clock,
+        );
+        #[cfg(feature = "timing")]
+        {
+            report.times = clock.times();
+        }
+        self.report.finish()
+    }
+
+    /// The report of the last frame, once more.
+    pub fn last_report(&self) -> FrameReport {
+        self.report.finish()
+    }
+
+    /// Lets the next frame compute everything anew, as if nothing were known: for measurements, and for callers who
+    /// changed what frames cannot see.
+    pub fn forget(&mut self) {
+        self.direct_stage.forget();
+        self.schedule.all_stale = true;
+    }
+}
+
+/// Results.
+impl Frame {
+    /// Direct irradiance, W/m², of all texels: replaces what `out` holds.
+    pub fn copy_direct_to(&self, out: &mut Vec<f32>) {
+        self.scene.layout.copy_by_texel(&self.light.direct, out);
+    }
+
+    /// Indirect irradiance, W/m², of all texels, not multiplied by the receiving texel's albedo: replaces what `out` holds.
+    pub fn copy_indirect_to(&self, out: &mut Vec<f32>) {
+        self.scene.layout.copy_by_texel(&self.light.indirect, out);
+    }
+
+    /// Coefficients b, block by block, channel by channel: replaces what `out` holds.
+    pub fn copy_coefficients_to(&self, out: &mut Vec<f32>) {
+        out.clear();
+        let rows = &self.scene.rows;
+        for &rank in &self.scene.layout.rank {
+            let row_of_mode = &rows.row_of_mode[self.scene.layout.shape(rank)];
+            let of_block = &self.light.coefficients[rows.of_block(rank)];
+            for channel in of_block.chunks_exact(rows.count) {
+                out.extend(row_of_mode.iter().map(|&row| channel[usize::from(row)]));
+            }
+        }
+    }
+
+    /// Direct irradiance, W/m², RGB, of one texel of a block; `None` if there is no such block or texel.
+    pub fn direct_at(&self, block: BlockIndex, texel: usize) -> Option<Vec3> {
+        let slot = self.scene.layout.slot(block, texel)?;
+        Some(self.light.direct.get(slot))
+    }
+
+    /// Indirect irradiance, W/m², RGB, of one texel of a block; `None` if there is no such block or texel.
+    pub fn indirect_at(&self, block: BlockIndex, texel: usize) -> Option<Vec3> {
+        let slot = self.scene.layout.slot(block, texel)?;
+        Some(self.light.indirect.get(slot))
+    }
+
+    /// The padded lightmap of indirect irradiance; of no pixels if not asked for.
+    pub fn lightmap(&self) -> Lightmap<'_> {
+        Lightmap::new(&self.scene.atlas, &self.outputs.lightmap)
+    }
+
+    /// Probes, if asked for and the dictionary has them.
+    pub fn probes(&self) -> Option<&Probes> {
+        self.outputs.probes.as_ref()
+    }
+
+    /// Spherical harmonics of indirect light, RGB each, at a point in metres: trilinear between the probes around it. `None`
+    /// outside all blocks, and without probes ([`Outputs::probes`](config::Outputs::probes)).
+    ///
+    /// Cost: independent of the number of blocks.
+    pub fn probe_at(&self, point: Vec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
+        let probes = self.outputs.probes.as_ref()?;
+        probes.at(&self.scene.level, point.as_dvec3())
+    }
+
+    /// Indirect irradiance, W/m², RGB, on a surface with a unit normal at a point in metres, such as that of a thing that
+    /// moves; `None` where [`Frame::probe_at`] is.
+    pub fn irradiance_at(&self, point: Vec3, normal: Vec3) -> Option<Vec3> {
+        Some(irradiance_from_probe(&self.probe_at(point)?, normal))
+    }
+
+    /// Vector irradiance, if asked for and the dictionary has it: block by block, in a block channel by channel, in a
+    /// channel texel by texel four coefficients of 1, v, normal and u in the texel's tangent frame.
+    /// [`evaluate_f32`] gives irradiance for a normal.
+    pub fn vector(&self) -> &[f32] {
+        &self.outputs.vector
+    }
+
+    /// Indirect irradiance, W/m², RGB, at one texel of a block for a unit normal in the texel's tangent frame (along u,
+    /// along v, along the wall's normal); 0 where truncation makes it negative. `None` if there is no such block or texel,
+    /// and without vector irradiance ([`Outputs::vector`](config::Outputs::vector)).
+    pub fn vector_at(&self, block: BlockIndex, texel: usize, normal: Vec3) -> Option<Vec3> {
+        let range = &self.scene.level.block(block)?.texels;
+        if texel >= range.len() || self.outputs.vector.is_empty() {
+            return None;
         }
         let start = 4 * (3 * range.start + texel);
-        std::array::from_fn(|channel| {
+        let channel = |channel: usize| {
             let at = start + 4 * channel * range.len();
-            let c = std::array::from_fn(|k| self.vector[at + k]);
-            evaluate_f32(&c, normal).max(0.0)
-        })
+            let coefficients = std::array::from_fn(|k| self.outputs.vector[at + k]);
+            evaluate_f32(&coefficients, normal).max(0.0)
+        };
+        Some(Vec3::new(channel(0), channel(1), channel(2)))
     }
+}
 
-    /// Time that each stage took, summed over the passes.
-    pub fn times(&self) -> StageTimes {
-        self.times
-    }
-
-    /// Blocks that the last frame worked on.
-    pub fn work(&self) -> FrameWork {
-        self.work
-    }
-
-    /// Passes of the last frame.
-    pub fn passes(&self) -> u32 {
-        self.passes
+/// Blocks whose direct light a frame brings up to date.
+fn blocks_at_most(config: &FrameConfig) -> usize {
+    match (config.slice, config.bounces) {
+        (Some(slice), Bounces::Count(1) | Bounces::Feedback) => slice.get(),
+        _ => usize::MAX,
     }
 }

@@ -1,24 +1,28 @@
 //! `T_b->r` in the paper's form, for tools that compare with it: responses for each opening that light enters by, as
-//! they are before [`assemble`](crate::modular::assemble::assemble) projects them on joint bases (Loos et al. 2011, section 6.3).
+//! they are before [`Scene::assemble`](crate::modular::scene::Scene::assemble) projects them on joint bases (Loos et al. 2011, section 6.3).
 
 use crate::level::block::Level;
-use crate::modular::assemble::{AssembleConfig, AssembleError, usable_coupling, used_operators};
+use crate::level::block_index::BlockIndex;
+use crate::modular::assemble::config::AssembleConfig;
+use crate::modular::assemble::error::AssembleError;
+use crate::modular::assemble::lookup::{usable_coupling, used_operators};
 use crate::modular::dictionary::{Dictionary, OperatorMatrix};
-use crate::modular::propagate;
-use crate::modular::scene::Scene;
+use crate::modular::propagate::context::PropagationContext;
+use crate::modular::propagate::follow_all;
+use crate::modular::scene::SceneData;
 use mrt_core::linalg::matrix::Matrix;
 
 /// How the light of one block answers behind one opening of another.
 #[derive(Clone, Debug)]
 pub struct OpeningResponses {
     /// Block that light enters.
-    pub target: usize,
+    pub target: BlockIndex,
     /// Position in its shape's openings of the one that it enters by.
     pub opening: usize,
     /// True in the opening's frame with x and y exchanged; never in levels whose openings all keep up.
     pub exchanged: bool,
     /// Block that it comes from.
-    pub source: usize,
+    pub source: BlockIndex,
     /// Response modes x coefficients b of the source.
     pub responses: Matrix<f32>,
 }
@@ -33,7 +37,7 @@ pub struct OpeningResponses {
 /// [`AssembleError`], if `scene` could not be assembled so from the level and the dictionary.
 pub fn responses_by_opening(
     level: &Level,
-    scene: &Scene,
+    scene: &SceneData,
     dictionary: &Dictionary<impl OperatorMatrix>,
     config: &AssembleConfig,
 ) -> Result<Vec<OpeningResponses>, AssembleError> {
@@ -42,5 +46,23 @@ pub fn responses_by_opening(
         coupling: usable_coupling(level, dictionary, config.coupling)?,
         ..config.clone()
     };
-    propagate::responses_by_opening(scene, dictionary, &used, &config)
+    let context = PropagationContext::new(scene, dictionary, &used, &config);
+    let mut all = Vec::new();
+    follow_all(&context, |source, arrivals| {
+        for (key, responses) in arrivals {
+            let target = &scene.level.blocks[key.block.get()];
+            let mut openings = target.shape.openings.iter();
+            if let Some(opening) = openings.position(|opening| opening.face == key.face) {
+                all.push(OpeningResponses {
+                    target: key.block,
+                    opening,
+                    exchanged: key.exchanged,
+                    source,
+                    responses,
+                });
+            }
+        }
+        Ok(())
+    })?;
+    Ok(all)
 }

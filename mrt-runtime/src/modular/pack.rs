@@ -1,11 +1,12 @@
 //! Leaves out of a dictionary what a level does not use, so that a game ships no more.
 
 use crate::level::block::Level;
-use crate::modular::assemble::{
-    AssembleError, Coupling, place_blocks, usable_coupling, used_operators,
-};
+use crate::modular::assemble::config::Coupling;
+use crate::modular::assemble::error::AssembleError;
+use crate::modular::assemble::lookup::{usable_coupling, used_operators};
+use crate::modular::assemble::place::place_level;
 use crate::modular::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
-use crate::modular::propagate::used_paths;
+use crate::modular::propagate::table::used_paths;
 
 /// What of a dictionary is kept beside the operators that the level uses.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,18 +40,18 @@ impl Default for PackConfig {
 /// copies those that are not borrowed.
 ///
 /// # Errors
-/// As [`assemble`](crate::modular::assemble::assemble) with default settings, but for [`AssembleError::TooLarge`].
+/// As [`Scene::assemble`](crate::modular::scene::Scene::assemble) with default settings, but for [`AssembleError::TooLarge`].
 pub fn pack<M: OperatorMatrix>(
     level: &Level,
     dictionary: &Dictionary<M>,
     config: &PackConfig,
 ) -> Result<Dictionary<M>, AssembleError> {
     level.check()?;
-    let (used, operators_of_block) = used_operators(level, dictionary)?;
-    let blocks = place_blocks(level, dictionary, &used, &operators_of_block)?;
+    let (used, _) = used_operators(level, dictionary)?;
+    let placed = place_level(level, dictionary)?;
     let needs_lightfields =
         usable_coupling(level, dictionary, Coupling::Table)? == Coupling::Lightfield;
-    let used_paths = used_paths(&blocks, &dictionary.paths)?;
+    let used_paths = used_paths(&placed.blocks, &dictionary.paths)?;
     // Everything but the matrices is small, so leaving out is simpler than choosing.
     let mut packed = dictionary.clone();
     packed

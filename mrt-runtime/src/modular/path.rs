@@ -227,7 +227,7 @@ mod tests {
         // 1, 2, 5, 14, 41: (3^d + 1) / 2.
         assert_eq!(count(5, true), 1 + 2 + 5 + 14 + 41);
         // One hole at each of the crossings.
-        assert_eq!(Word::all(0, 2, &[Hole::Door], false).len(), 1 + 2 * 2);
+        assert_eq!(Word::all(0, 2, &[Hole::Doorway], false).len(), 1 + 2 * 2);
     }
 
     #[test]

@@ -6,14 +6,16 @@
 //! one another.
 
 use crate::executor::{Executor, run_parts, task_count};
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::{Beyond, PlacedBlock, PlacedLevel};
 use crate::level::shape::Shape;
-use crate::modular::scene::{Beyond, Layout, Planes, SceneBlock};
+use crate::output::texel_layout::{BlockRank, Planes, TexelLayout};
 use glam::{DVec3, Vec2};
 use mrt_core::geometry::cube::Face;
 
 /// Where each texel of a scene goes in the lightmap.
 #[derive(Clone, Debug)]
-pub struct AtlasLayout {
+pub struct LightmapAtlas {
     /// Pixels a row.
     pub width: usize,
     /// Rows.
@@ -28,9 +30,11 @@ pub struct AtlasLayout {
     resolution: usize,
 }
 
-impl AtlasLayout {
+impl LightmapAtlas {
     /// Lays out the walls of all blocks in a nearly square image.
-    pub(crate) fn new(blocks: &[SceneBlock], resolution: usize, layout: &Layout) -> Self {
+    pub(crate) fn new(level: &PlacedLevel, layout: &TexelLayout) -> Self {
+        let blocks = &level.blocks[..];
+        let resolution = level.resolution;
         let wall_count: usize = blocks.iter().map(|block| block.shape.walls().count()).sum();
         let tile = resolution + 2;
         let columns = (1..)
@@ -48,8 +52,8 @@ impl AtlasLayout {
             resolution,
         };
         let mut next = 0;
-        // (place of a block, tile that shows it)
-        let mut shows: Vec<(u32, u32)> = Vec::new();
+        // (rank of a block, tile that shows it)
+        let mut shows: Vec<(BlockRank, u32)> = Vec::new();
         for (index, block) in blocks.iter().enumerate() {
             for face in block.shape.walls() {
                 let origin = [next % columns * tile, next / columns * tile];
@@ -59,14 +63,14 @@ impl AtlasLayout {
                     for column in 0..tile {
                         let place = [column as isize - 1, row as isize - 1];
                         let seen = texel_seen(blocks, index, face, place, resolution);
-                        atlas.slots.push(seen.map_or(u32::MAX, |(block, texel)| {
+                        let slot = seen.and_then(|(block, texel)| {
                             let rank = layout.rank[block];
                             if !shows[first..].contains(&(rank, next as u32)) {
                                 shows.push((rank, next as u32));
                             }
-                            let map = &layout.slot_of_texel[blocks[block].shape_index];
-                            layout.slots[rank as usize].start as u32 + map[texel]
-                        }));
+                            layout.slot(BlockIndex::new(block), texel)
+                        });
+                        atlas.slots.push(slot.map_or(u32::MAX, |slot| slot as u32));
                     }
                 }
                 next += 1;
@@ -74,9 +78,9 @@ impl AtlasLayout {
         }
         shows.sort_unstable();
         let mut at = 0;
-        for place in 0..blocks.len() as u32 {
+        for rank in layout.ranks() {
             atlas.shown_by.push(at as u32);
-            while at < shows.len() && shows[at].0 == place {
+            while at < shows.len() && shows[at].0 == rank {
                 atlas.shown.push(shows[at].1);
                 at += 1;
             }
@@ -87,23 +91,30 @@ impl AtlasLayout {
 
     /// Pixel coordinates (x to the right, y down the rows, pixel centres at halves) at which a bilinear
     /// filter reads the light at (u, v) in [0, 1]² of a block's canonical wall; `None` for openings.
-    pub fn pixel(&self, block: usize, face: Face, u: f32, v: f32) -> Option<Vec2> {
-        let [x, y] = self.tiles.get(block)?[face.index()]?;
+    pub fn pixel(&self, block: BlockIndex, face: Face, u: f32, v: f32) -> Option<Vec2> {
+        let [x, y] = self.tiles.get(block.get())?[face.index()]?;
         let scale = self.resolution as f32;
         let inside = Vec2::new(u.clamp(0.0, 1.0), v.clamp(0.0, 1.0)) * scale;
         Some(Vec2::new(x as f32 + 1.0, y as f32 + 1.0) + inside)
     }
 
-    /// [`AtlasLayout::pixel`] over the image's size: texture coordinates in [0, 1]².
-    pub fn texture_coordinate(&self, block: usize, face: Face, u: f32, v: f32) -> Option<Vec2> {
+    /// [`LightmapAtlas::pixel`] over the image's size: texture coordinates in [0, 1]².
+    pub fn texture_coordinate(
+        &self,
+        block: BlockIndex,
+        face: Face,
+        u: f32,
+        v: f32,
+    ) -> Option<Vec2> {
         let size = Vec2::new(self.width as f32, self.height as f32);
         Some(self.pixel(block, face, u, v)? / size)
     }
 
-    /// Bilinear lookup in an image of this layout at pixel coordinates from [`AtlasLayout::pixel`].
+    /// Bilinear lookup in an image of this layout at pixel coordinates from [`LightmapAtlas::pixel`]; zero in an image of
+    /// another size.
     pub fn sample(&self, image: &[[f32; 3]], pixel: Vec2) -> [f32; 3] {
         // A level of open blocks alone has no walls.
-        if self.width == 0 || self.height == 0 {
+        if self.width == 0 || self.height == 0 || image.len() != self.width * self.height {
             return [0.0; 3];
         }
         let at = (pixel - 0.5).clamp(
@@ -121,7 +132,34 @@ impl AtlasLayout {
         })
     }
 
-    /// Length that a list of tiles may have in [`AtlasLayout::fill`].
+    /// Number of tiles: one a wall.
+    pub fn tile_count(&self) -> usize {
+        let tile = self.resolution + 2;
+        self.slots.len() / (tile * tile)
+    }
+
+    /// Where a tile stands in the image; `None` if there is no such tile.
+    pub fn tile(&self, index: usize) -> Option<Tile> {
+        let size = self.resolution + 2;
+        let columns = self.width / size;
+        (index < self.tile_count()).then(|| Tile {
+            x: index % columns * size,
+            y: index / columns * size,
+            size,
+        })
+    }
+
+    /// Tiles a row.
+    pub(crate) fn columns(&self) -> usize {
+        self.width / self.tile_size()
+    }
+
+    /// Pixels along an edge of a tile.
+    pub(crate) fn tile_size(&self) -> usize {
+        self.resolution + 2
+    }
+
+    /// Length that a list of tiles may have in [`LightmapAtlas::fill`].
     pub(crate) fn tile_list_size(&self) -> usize {
         self.shown.len()
     }
@@ -129,7 +167,7 @@ impl AtlasLayout {
     /// Copies texels to the tiles that show the changed blocks; `tiles` is room for their list.
     pub(crate) fn fill(
         &self,
-        changed: &[u32],
+        changed: &[BlockRank],
         tiles: &mut Vec<u32>,
         texels: &Planes,
         image: &mut [[f32; 3]],
@@ -137,7 +175,7 @@ impl AtlasLayout {
     ) {
         tiles.clear();
         for &place in changed {
-            let place = place as usize;
+            let place = place.get();
             let (start, end) = (self.shown_by[place], self.shown_by[place + 1]);
             tiles.extend_from_slice(&self.shown[start as usize..end as usize]);
         }
@@ -188,6 +226,17 @@ fn copy_row(slots: &[u32], [red, green, blue]: [&[f32]; 3], pixels: &mut [[f32; 
     }
 }
 
+/// A square of the lightmap: one wall, with a border of one pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Tile {
+    /// First pixel from the left.
+    pub x: usize,
+    /// First row from the top.
+    pub y: usize,
+    /// Pixels along an edge.
+    pub size: usize,
+}
+
 /// A point in the plane of a block's wall, inside it or up to a texel beside it.
 #[derive(Clone, Copy)]
 struct Place {
@@ -208,7 +257,7 @@ const PAST: f64 = 1e-6;
 /// the middle one twice: the middle one's at its corner, the others' beside it, at their crease with the
 /// pillar.
 fn texel_seen(
-    blocks: &[SceneBlock],
+    blocks: &[PlacedBlock],
     block: usize,
     face: Face,
     [column, row]: [isize; 2],
@@ -253,7 +302,7 @@ fn texel_seen(
 /// Charts are quarters of the section in every tube, and joined openings are the same disc: rows of texels go on
 /// from tube to tube and around each.
 fn texel_seen_in_tube(
-    blocks: &[SceneBlock],
+    blocks: &[PlacedBlock],
     block: usize,
     point: DVec3,
     resolution: usize,
@@ -273,7 +322,7 @@ fn texel_seen_in_tube(
         ) = (past > 0.0, placed.beyond[side.index()])
         {
             point = here_from_there.inverse().point(point - side.outward());
-            block = there;
+            block = there.get();
             break;
         }
     }
@@ -305,7 +354,7 @@ fn corner(axis: usize, k: isize, last: isize) -> Option<Face> {
 }
 
 /// What a pixel beyond `side` shows; `corner` is the side that it is nearest to, if it is at the end.
-fn beside(blocks: &[SceneBlock], here: Place, side: Face, corner: Option<Face>) -> Place {
+fn beside(blocks: &[PlacedBlock], here: Place, side: Face, corner: Option<Face>) -> Place {
     if let (1, place) = walk(blocks, here, [side]) {
         return place;
     }
@@ -321,7 +370,7 @@ fn beside(blocks: &[SceneBlock], here: Place, side: Face, corner: Option<Face>) 
 /// Follows a wall over `sides`, as `from` names them, up to the first that does not lead on; returns how many
 /// were crossed, and the same point as the last block sees it.
 fn walk<const N: usize>(
-    blocks: &[SceneBlock],
+    blocks: &[PlacedBlock],
     from: Place,
     mut sides: [Face; N],
 ) -> (usize, Place) {
@@ -336,6 +385,7 @@ fn walk<const N: usize>(
         else {
             return (k, here);
         };
+        let block = block.get();
         // Around a hole there is a wall between the blocks.
         if !blocks[here.block].shape.is_open(side) {
             return (k, here);

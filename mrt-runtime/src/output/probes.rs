@@ -3,34 +3,14 @@
 //! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
 //! walls, so both show the same light. Between probes the light is interpolated, across openings too.
 
-use crate::modular::frame::{Expand, Scratch};
-use crate::modular::scene::{Beyond, Scene};
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::{Beyond, PlacedLevel};
+use crate::output::pixel_formats::f16_bits;
+use crate::output::probe_order::{PROBE_COEFFICIENTS, ProbeOrder};
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sh;
 use mrt_core::simd::{Kernel, Lanes, SimdLevel};
-
-/// Coefficients of a probe: bands 0 to 2.
-pub const PROBE_COEFFICIENTS: usize = 9;
-
-/// How much of the light's directions probes keep.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum ProbeOrder {
-    /// Four coefficients: bands 0 and 1.
-    L1,
-    /// Nine: bands 0 to 2.
-    L2,
-}
-
-impl ProbeOrder {
-    /// Coefficients of a probe.
-    pub fn coefficients(self) -> usize {
-        match self {
-            ProbeOrder::L1 => 4,
-            ProbeOrder::L2 => 9,
-        }
-    }
-}
 
 /// Matrices that turn bands 1 and 2, row by row; band 0 stays.
 type BandRotations = [[f32; 5]; 3 + 5];
@@ -110,20 +90,21 @@ pub struct Probes {
 }
 
 impl Probes {
-    /// Dark probes for a scene, or `None` if its dictionary was baked without.
-    pub(crate) fn new(scene: &Scene, order: ProbeOrder) -> Option<Self> {
-        let count = scene.probes * scene.probes * scene.probes;
-        (count > 0).then(|| Self {
+    /// Dark probes, `per_axis`³ a block; `world_from_probe` takes the axes of each block's probes to the world's.
+    pub(crate) fn new(
+        order: ProbeOrder,
+        per_axis: usize,
+        world_from_probe: impl Iterator<Item = DMat3>,
+    ) -> Self {
+        let count = per_axis * per_axis * per_axis;
+        let rotations: Vec<_> = world_from_probe.map(|r| band_rotations(&r)).collect();
+        Self {
             order,
-            per_axis: scene.probes,
-            values: vec![[0.0; 3]; scene.blocks.len() * count * order.coefficients()],
+            per_axis,
+            values: vec![[0.0; 3]; rotations.len() * count * order.coefficients()],
             scratch: vec![0.0; 6 * count * order.coefficients()],
-            rotations: scene
-                .blocks
-                .iter()
-                .map(|block| band_rotations(&block.world_from_probe))
-                .collect(),
-        })
+            rotations,
+        }
     }
 
     /// How many coefficients each probe has.
@@ -136,74 +117,54 @@ impl Probes {
         self.per_axis
     }
 
-    /// Number of blocks that these are the probes of.
-    pub(crate) fn block_count(&self) -> usize {
-        self.rotations.len()
-    }
-
     /// All coefficients, W/(m² sr) times the square root of steradian; see [`Probes`] for their order.
     pub fn values(&self) -> &[[f32; 3]] {
         &self.values
     }
 
-    /// All coefficients as the bits of half-precision numbers, in the same order: what a texture takes.
-    ///
-    /// Values beyond 65,504 become that.
-    ///
-    /// # Panics
-    /// If `out` is not as long as [`Probes::values`].
-    pub fn write_f16(&self, out: &mut [[u16; 3]]) {
-        assert_eq!(out.len(), self.values.len(), "coefficients");
-        for (to, from) in out.iter_mut().zip(&self.values) {
-            *to = from.map(|x| {
-                let largest = f32::from(half::f16::MAX);
-                half::f16::from_f32(x.clamp(-largest, largest)).to_bits()
-            });
-        }
+    /// The coefficients of one block, as [`Probes::values`] has them; empty if there is no such block.
+    pub fn of_block(&self, block: BlockIndex) -> &[[f32; 3]] {
+        let size = self.per_axis.pow(3) * self.order.coefficients();
+        let start = block.get().saturating_mul(size);
+        self.values
+            .get(start..start.saturating_add(size))
+            .unwrap_or(&[])
+    }
+
+    /// Writes all coefficients as the bits of half-precision numbers, in the same order: what a texture takes. Values
+    /// beyond 65,504 become that. What `out` held is replaced.
+    pub fn write_f16(&self, out: &mut Vec<[u16; 3]>) {
+        out.clear();
+        out.extend(self.values.iter().map(|value| value.map(f16_bits)));
     }
 
     pub(crate) fn darken(&mut self) {
         self.values.fill([0.0; 3]);
     }
 
-    /// Dark, and turned as another scene's blocks are.
-    pub(crate) fn restart(&mut self, scene: &Scene) {
-        self.darken();
-        for (to, block) in self.rotations.iter_mut().zip(&scene.blocks) {
-            *to = band_rotations(&block.world_from_probe);
-        }
-    }
-
-    /// Expands the joint coefficients of one block, given by its place.
-    pub(crate) fn fill(
+    /// Takes the light of one block in its own axes, which `expand` writes: channel by channel, in that coefficient by
+    /// coefficient, in that probe by probe.
+    pub(crate) fn update(
         &mut self,
-        scene: &Scene,
-        place: usize,
-        level: SimdLevel,
-        joint: &[f32],
-        scratch: &mut Scratch,
+        block: BlockIndex,
+        simd: SimdLevel,
+        expand: impl FnOnce([&mut [f32]; 3]),
     ) {
         let count = self.per_axis * self.per_axis * self.per_axis;
         let kept = self.order.coefficients();
-        let block = scene.layout.order[place] as usize;
         let (canonical, turned) = self.scratch.split_at_mut(3 * kept * count);
         let (red, rest) = canonical.split_at_mut(kept * count);
         let (green, blue) = rest.split_at_mut(kept * count);
-        level.run(Expand {
-            basis: &scene.shapes[scene.blocks[block].shape_index].probes,
-            rows: kept * count,
-            joint,
-            scratch,
-            out: [red, green, blue],
-        });
-        level.run(Turn {
-            bands: &self.rotations[block],
+        expand([red, green, blue]);
+        simd.run(Turn {
+            bands: &self.rotations[block.get()],
             coefficients: kept,
             count,
             from: canonical,
             to: turned,
         });
-        let out = &mut self.values[block * count * kept..(block + 1) * count * kept];
+        let size = count * kept;
+        let out = &mut self.values[block.get() * size..(block.get() + 1) * size];
         for (probe, out) in out.chunks_exact_mut(kept).enumerate() {
             for (k, out) in out.iter_mut().enumerate() {
                 for (channel, out) in out.iter_mut().enumerate() {
@@ -216,9 +177,9 @@ impl Probes {
     /// Light at a point of the world: trilinear between the probes around it, those of joined blocks included;
     /// `None` outside all blocks. Coefficients beyond the probes' order are zero. Doors count as open: half a probe's
     /// spacing next to one, light is a mean of both sides.
-    pub fn at(&self, scene: &Scene, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
-        let block = scene.block_at(point, LOOKUP_TOLERANCE)?;
-        let unit = scene.blocks[block].warp.inverse(point)?;
+    pub fn at(&self, level: &PlacedLevel, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
+        let block = level.block_at(point)?;
+        let unit = level.block(block)?.warp.inverse(point)?;
         let place = unit * self.per_axis as f64 - 0.5;
         let low = place.floor();
         let weight = place - low;
@@ -231,7 +192,7 @@ impl Probes {
             );
             let share = bits * weight + (DVec3::ONE - bits) * (DVec3::ONE - weight);
             let share = share.element_product() as f32;
-            for (sum, value) in sum.iter_mut().zip(self.probe(scene, block, low + bits)) {
+            for (sum, value) in sum.iter_mut().zip(self.probe(level, block, low + bits)) {
                 for (sum, x) in sum.iter_mut().zip(value) {
                     *sum += share * x;
                 }
@@ -242,7 +203,7 @@ impl Probes {
 
     /// A probe by its place in a block's grid, which may be one step outside: then it is the neighbour's
     /// across an opening, and the nearest inside at a wall.
-    fn probe(&self, scene: &Scene, block: usize, place: DVec3) -> &[[f32; 3]] {
+    fn probe(&self, level: &PlacedLevel, block: BlockIndex, place: DVec3) -> &[[f32; 3]] {
         let n = self.per_axis as f64;
         let mut block = block;
         let mut point = (place + 0.5) / n;
@@ -256,12 +217,12 @@ impl Probes {
                 }
             });
             let Some(face) = outside else { break };
-            match scene.blocks[block].beyond[face.index()] {
+            match level.blocks[block.get()].beyond[face.index()] {
                 Beyond::Block {
                     block: next,
                     here_from_there,
                     ..
-                } if scene.blocks[block].shape.is_open(face) => {
+                } if level.blocks[block.get()].shape.is_open(face) => {
                     point = here_from_there.inverse().point(point - face.outward());
                     block = next;
                 }
@@ -273,12 +234,9 @@ impl Probes {
         let probe = (z * self.per_axis + y) * self.per_axis + x;
         let count = self.per_axis * self.per_axis * self.per_axis;
         let kept = self.order.coefficients();
-        &self.values[(block * count + probe) * kept..][..kept]
+        &self.values[(block.get() * count + probe) * kept..][..kept]
     }
 }
-
-/// Points may lie outside blocks by this fraction of their size.
-const LOOKUP_TOLERANCE: f64 = 1e-4;
 
 /// Irradiance, W/m², on a surface of unit `normal` under a probe's light; what truncation leaves negative is zero.
 pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {

@@ -7,14 +7,13 @@ use mrt_core::simd::SimdLevel;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::{Block, Connection, Door, Level, Opening};
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::light::beam::BeamTracer;
-use mrt_runtime::light::direct_light::add_beam;
-use mrt_runtime::light::placed::{Light, place};
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
+use mrt_runtime::blocks::{Block, Connection, Door, Opening, Shape, maze};
+use mrt_runtime::low_level::light::beam::BeamTracer;
+use mrt_runtime::low_level::light::direct_light::add_beam::add_beam;
+use mrt_runtime::low_level::light::placed::place;
+use mrt_runtime::{AssembleConfig, Level, Light, Scene};
 use mrt_tests::beam_check::{Tally, beams, compare, texels};
+use mrt_tests::position_of;
 use mrt_tests::{Random, assembled, floor_plan, random_cells, sphere};
 
 fn random_light(level: &Level, random: &mut Random) -> Light {
@@ -89,7 +88,7 @@ fn swept(name: &str, seed: u64, change: impl Fn(&mut Level)) {
         change(&mut level);
         let lights: Vec<Light> = (0..6).map(|_| random_light(&level, &mut random)).collect();
         let scene = assembled(&level);
-        compare(&scene, &lights, &scene.doors, &mut tally);
+        compare(&scene, &lights, &scene.level.doors, &mut tally);
     }
     println!("{name}: {tally:?}");
     // A shadow's edge is 2e-5 diagonals wide here, and a texel's edge is 0.036: one in a thousand is at an edge.
@@ -130,7 +129,7 @@ fn beams_are_the_walk_in_a_maze() {
     let mut random = Random(4);
     let lights: Vec<Light> = (0..20).map(|_| random_light(&level, &mut random)).collect();
     let mut tally = Tally::default();
-    compare(&scene, &lights, &scene.doors, &mut tally);
+    compare(&scene, &lights, &scene.level.doors, &mut tally);
     println!("{tally:?}");
     assert!(tally.edges * 1000 < tally.texels);
 }
@@ -145,20 +144,20 @@ fn blocks_behind_closed_doors_and_walls_have_no_beam() {
     });
     let scene = assembled(&level);
     let light = sphere(Vec3::new(0.4, 0.6, 0.5), 0.1, Vec3::ONE);
-    let placed = place(&scene, 0, light).expect("inside");
-    let mut tracer = BeamTracer::new(&scene);
+    let placed = place(&scene.level, light).expect("inside");
+    let mut tracer = BeamTracer::new(&scene.level);
     let reached = |tracer: &mut BeamTracer, doors: &[f32]| {
         let found = beams(&scene, tracer, &placed, doors);
         found
             .iter()
-            .map(|b| (b.block, b.fraction))
+            .map(|b| (b.block.get(), b.fraction))
             .collect::<Vec<_>>()
     };
     assert_eq!(reached(&mut tracer, &[0.0]), [(0, 1.0), (1, 1.0), (2, 1.0)]);
     let half_open = [(0, 1.0), (1, 1.0), (2, 1.0), (3, 0.5), (4, 0.5)];
     assert_eq!(reached(&mut tracer, &[0.5]), half_open);
     let dark = sphere(Vec3::new(0.4, 0.6, 0.5), 0.1, Vec3::ZERO);
-    let placed = place(&scene, 0, dark).expect("inside");
+    let placed = place(&scene.level, dark).expect("inside");
     assert!(beams(&scene, &mut tracer, &placed, &[1.0]).is_empty());
 }
 
@@ -171,7 +170,7 @@ const MOST_IN_ROOM: usize = 4 * 49;
 fn a_room_has_as_many_beams_as_it_has_sequences_of_openings() {
     let cells: Vec<[i32; 2]> = (0..49).map(|k| [k % 7, k / 7]).collect();
     let scene = assembled(&floor_plan(&cells, 0.5));
-    let mut tracer = BeamTracer::new(&scene);
+    let mut tracer = BeamTracer::new(&scene.level);
     for position in [
         Vec3::new(3.4, 0.5, 3.6),
         Vec3::new(0.3, 0.2, 0.4),
@@ -180,7 +179,7 @@ fn a_room_has_as_many_beams_as_it_has_sequences_of_openings() {
         Vec3::new(3.5, 0.5, 3.5),
     ] {
         let light = sphere(position, 0.1, Vec3::ONE);
-        let placed = place(&scene, 0, light).expect("inside");
+        let placed = place(&scene.level, light).expect("inside");
         let found = beams(&scene, &mut tracer, &placed, &[]);
         println!("{position}: {} beams", found.len());
         assert!((49..=MOST_IN_ROOM).contains(&found.len()));
@@ -238,10 +237,10 @@ fn extreme_sizes_and_intensities_are_the_walk() {
             })
             .collect();
         // At a texel's centre, where there is no direction, and beside it.
-        let texel = scene.texel_position(100);
+        let texel = position_of(&scene, 100);
         lights.push(sphere(texel, 0.0, Vec3::splat(1e9)));
         lights.push(sphere(texel, 1e9, Vec3::splat(1e9)));
-        compare(&scene, &lights, &scene.doors, &mut Tally::default());
+        compare(&scene, &lights, &scene.level.doors, &mut Tally::default());
     }
 }
 
@@ -288,7 +287,7 @@ fn tubes_are_left_to_the_walk() {
         );
         level.connections.push(Connection { a, b });
     }
-    let scene = assemble(&level, &dictionary, &AssembleConfig::default()).expect("tubes");
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default()).expect("tubes");
     let lights = [
         sphere(Vec3::new(0.6, 0.55, 0.45), 0.1, Vec3::ONE),
         sphere(Vec3::new(2.4, 0.5, 0.6), 0.1, Vec3::ONE),
@@ -306,14 +305,14 @@ fn tubes_are_left_to_the_walk() {
 #[test]
 fn tracing_and_adding_allocate_nothing() {
     let scene = assembled(&maze(41, Vec3::splat(0.5), 1));
-    let mut tracer = BeamTracer::new(&scene);
+    let mut tracer = BeamTracer::new(&scene.level);
     let light = sphere(Vec3::new(0.5, 0.5, 0.5), 0.1, Vec3::ONE);
-    let placed = place(&scene, 0, light).expect("inside");
+    let placed = place(&scene.level, light).expect("inside");
     let most = scene.layout.slots.iter().map(|slots| slots.len()).max();
     let mut out = [0, 1, 2].map(|_| vec![0.0; most.expect("blocks")]);
     let counted = allocation_counter::measure(|| {
-        tracer.trace(&scene, 0, &placed, &[], &mut |beam| {
-            let planes = texels(&scene, beam.block as usize);
+        tracer.trace(&scene.level, 0, &placed, &[], &mut |beam| {
+            let planes = texels(&scene, beam.block);
             let count = planes.positions[0].len();
             let slices = out.each_mut().map(|s| &mut s[..count]);
             add_beam(SimdLevel::detect(), &planes, &placed, beam, slices);

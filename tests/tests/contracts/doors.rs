@@ -2,11 +2,10 @@
 
 use glam::Vec3;
 use mrt_core::storage::Storage;
-use mrt_runtime::level::block::{Door, Level};
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::blocks::Door;
+use mrt_runtime::{AssembleConfig, Bounces, Coupling, Frame, FrameError, Level, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{
     CONVERGED, Random, by_texel, corridor, default_dictionary, floor_plan, largest_difference,
     random_cells, solved, sphere,
@@ -27,7 +26,7 @@ fn assembled(level: &Level, coupling: Coupling) -> Scene {
         negligible: Some(0.0),
         ..AssembleConfig::default()
     };
-    assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")
+    Scene::assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")
 }
 
 /// The connection between two blocks.
@@ -44,14 +43,15 @@ fn with_door(mut level: Level, connection: usize, value: f32) -> Level {
     level
 }
 
-fn lamp(position: Vec3) -> mrt_runtime::light::placed::Light {
+fn lamp(position: Vec3) -> mrt_runtime::Light {
     sphere(position, 0.1, Vec3::new(1.0, 2.0, 3.0))
 }
 
 /// Texels of a signal in some blocks.
 fn in_blocks(scene: &Scene, signal: &[f32], blocks: std::ops::Range<usize>) -> Vec<[f32; 3]> {
     let all = by_texel(scene, signal);
-    let texels = scene.blocks[blocks.start].texels.start..scene.blocks[blocks.end - 1].texels.end;
+    let texels = scene.level.blocks[blocks.start].texels.start
+        ..scene.level.blocks[blocks.end - 1].texels.end;
     all[texels].to_vec()
 }
 
@@ -119,15 +119,13 @@ fn light_that_crosses_doors_is_multiplied_by_their_values() {
     for coupling in COUPLINGS {
         let scene = assembled(&level, coupling);
         let mut direct = vec![0.0; 3 * scene.texel_count()];
-        direct[..3 * scene.blocks[0].texels.end].fill(1.0);
-        let mut frame = Frame::new(&scene);
+        direct[..3 * scene.level.blocks[0].texels.end].fill(1.0);
+        let mut frame = Frame::new(&scene, FrameConfig::default());
         let mut solve = |values: [f32; 2]| {
             for (door, value) in values.into_iter().enumerate() {
                 frame.set_door(door, value).expect("a door and a fraction");
             }
-            frame
-                .solve_from_direct(&scene, &direct, Bounces::Count(1))
-                .expect("light of the right length");
+            frame.light_from(&direct, Bounces::Count(1));
             (0..4)
                 .map(|block| in_blocks(&scene, &frame.indirect(), block..block + 1))
                 .collect::<Vec<_>>()
@@ -160,14 +158,12 @@ fn opening_a_door_never_takes_light_from_behind_it() {
     let level = floor_plan(&corridor(4), 0.8);
     let connection = between(&level, 1, 2);
     let scene = assembled(&with_door(level, connection, 0.0), Coupling::Table);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let mut before = 0.0;
     for step in 0..=8 {
         frame.set_door(0, step as f32 / 8.0).expect("a fraction");
         let light = lamp(Vec3::new(0.4, 0.6, 0.3));
-        frame
-            .solve(&scene, &[light], &Openings, TEN)
-            .expect("a sound light");
+        frame.light_with(&[light], TEN);
         let behind = in_blocks(&scene, &frame.indirect(), 2..4);
         let sum: f32 = behind.as_flattened().iter().sum();
         assert!(step == 0 || sum > before, "{step}: {sum}, {before} before");
@@ -179,7 +175,7 @@ fn opening_a_door_never_takes_light_from_behind_it() {
 fn values_that_are_none_and_doors_that_are_not_there_are_refused() {
     let level = floor_plan(&corridor(2), 0.5);
     let scene = assembled(&with_door(level, 0, 0.5), Coupling::Table);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     for (door, value) in [
         (0, f32::NAN),
         (0, -0.1),

@@ -3,11 +3,13 @@
 use allocation_counter::measure;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
-use mrt_runtime::level::block::{Door, Level};
-use mrt_runtime::light::placed::{Light, LightError};
-use mrt_runtime::light::visibility::{Openings, Rays};
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameError, MAX_LIGHTS};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::light::limits::MAX_LIGHTS;
+use mrt_runtime::shadows::Rays;
+use mrt_runtime::{Bounces, Frame, FrameError, Level, Light, LightError, Scene};
+use mrt_tests::FrameForTests;
+use mrt_tests::normal_of;
+use mrt_tests::position_of;
 use mrt_tests::{assembled, by_texel, floor_plan, solved, sphere};
 
 const CELLS: [[i32; 2]; 4] = [[0, 0], [1, 0], [2, 0], [1, 1]];
@@ -46,18 +48,20 @@ const GOOD_DIRECTIONAL: Light = Light::Directional {
 /// Everything that a frame shows, bit by bit.
 fn snapshot(frame: &Frame) -> Vec<u32> {
     let signals = [frame.direct(), frame.indirect(), frame.coefficients()];
-    let lightmap = frame.lightmap().as_flattened().to_vec();
+    let lightmap = frame.lightmap().pixels().as_flattened().to_vec();
     let all = signals.into_iter().chain([lightmap]).flatten();
-    all.map(|x| x.to_bits()).chain([frame.passes()]).collect()
+    all.map(|x| x.to_bits())
+        .chain([frame.last_report().passes()])
+        .collect()
 }
 
 #[test]
 fn a_frame_allocates_nothing() {
     let scene = assembled(&level_with_a_door_outside());
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let lights = [GOOD_SPHERE, GOOD_SPOT, GOOD_DIRECTIONAL];
-    let mut refused = lights;
-    refused[2] = sphere(Vec3::new(50.0, 0.5, 0.5), 0.1, Vec3::ONE);
+    let mut outside = lights;
+    outside[2] = sphere(Vec3::new(50.0, 0.5, 0.5), 0.1, Vec3::ONE);
     let converged = Bounces::Converged {
         tolerance: 1e-3,
         limit: 50,
@@ -71,13 +75,12 @@ fn a_frame_allocates_nothing() {
         // The very first frame included.
         let counted = measure(|| {
             for lights in [&lights[..], &lights[..1], &[], &lights[..]] {
-                let solved = frame.solve(&scene, lights, &Openings, bounces);
-                assert!(solved.is_ok());
+                frame.light_with(lights, bounces);
             }
-            let error = frame.solve(&scene, &refused, &Openings, bounces);
-            assert!(error.is_err());
+            frame.set_lights(&outside);
+            assert_eq!(frame.solve().skipped_lights().len(), 1);
             let rays = Rays(|_: DVec3, _: DVec3| 0.5);
-            assert!(frame.solve(&scene, &lights, &rays, bounces).is_ok());
+            frame.light_through(&lights, &rays, bounces);
         });
         assert_eq!(counted.count_total, 0, "{bounces:?}");
     }
@@ -86,22 +89,23 @@ fn a_frame_allocates_nothing() {
 }
 
 #[test]
-fn the_most_lights_fit_without_allocation_and_one_more_is_refused() {
+fn the_most_lights_fit_without_allocation_and_one_more_is_skipped() {
     let scene = assembled(&floor_plan(&[[0, 0]], 0.5));
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let lights = vec![GOOD_SPHERE; MAX_LIGHTS + 1];
     let counted = measure(|| {
-        let most = frame.solve(&scene, &lights[..MAX_LIGHTS], &Openings, Bounces::Count(1));
-        assert_eq!(most, Ok(()));
+        frame.light_with(&lights[..MAX_LIGHTS], Bounces::Count(1));
     });
     assert_eq!(counted.count_total, 0);
     let before = snapshot(&frame);
-    let error = frame.solve(&scene, &lights, &Openings, Bounces::Count(1));
+    let one_more = frame.add_light(GOOD_SPHERE);
+    let report = frame.solve();
+    let [skipped] = report.skipped_lights() else {
+        panic!("{:?}", report.skipped_lights());
+    };
     assert_eq!(
-        error,
-        Err(FrameError::TooManyLights {
-            found: MAX_LIGHTS + 1
-        })
+        (skipped.id, skipped.reason),
+        (one_more, LightError::TooMany)
     );
     assert_eq!(snapshot(&frame), before);
 }
@@ -169,23 +173,24 @@ fn spot(direction: Vec3, inner_angle: f32, outer_angle: f32) -> Light {
 }
 
 #[test]
-fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
+fn faulty_lights_are_named_and_the_others_shine() {
     let scene = assembled(&level());
     let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(3));
-    let before = snapshot(&frame);
+    let alone = snapshot(&frame);
     let mut refuse = |light: Light| {
-        let error = frame
-            .solve(&scene, &[GOOD_SPHERE, light], &Openings, Bounces::Count(1))
-            .expect_err("the light is faulty");
-        assert_eq!(snapshot(&frame), before, "{light:?}");
-        let FrameError::Light(error) = error else {
-            panic!("{light:?}: {error}");
+        let id = frame.add_light(light);
+        let report = frame.solve();
+        assert_eq!(snapshot(&frame), alone, "{light:?}");
+        assert!(frame.remove_light(id).is_some(), "{light:?}");
+        let [skipped] = report.skipped_lights() else {
+            panic!("{light:?}: {:?}", report.skipped_lights());
         };
-        error
+        assert_eq!(skipped.id, id);
+        skipped.reason
     };
     for (field, light) in faulty_lights() {
         match refuse(light) {
-            LightError::OutOfRange { light: 1, what, .. } => assert_eq!(what, field, "{light:?}"),
+            LightError::OutOfRange { what, .. } => assert_eq!(what, field, "{light:?}"),
             other => panic!("{light:?}: {other}"),
         }
     }
@@ -196,10 +201,7 @@ fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
         };
         for light in [directional, spot(direction, 0.1, 0.2)] {
             let error = refuse(light);
-            assert!(
-                matches!(error, LightError::NoDirection { light: 1, .. }),
-                "{error}"
-            );
+            assert!(matches!(error, LightError::NoDirection { .. }), "{error}");
         }
     }
     for position in [
@@ -209,10 +211,7 @@ fn refused_lights_are_named_and_leave_the_frame_as_it_was() {
         Vec3::new(0.5, 1.001, 0.5),
     ] {
         let error = refuse(sphere(position, 0.1, Vec3::ONE));
-        assert!(
-            matches!(error, LightError::OutsideBlocks { light: 1, .. }),
-            "{error}"
-        );
+        assert!(matches!(error, LightError::OutsideBlocks { .. }), "{error}");
     }
 }
 
@@ -225,7 +224,7 @@ fn extreme_but_legal_lights_give_finite_light() {
             for position in [
                 Vec3::splat(0.5),
                 Vec3::ZERO,
-                scene.texel_position(17),
+                position_of(&scene, 17),
                 Vec3::new(1.0, 0.5, 0.5),
             ] {
                 lights.push(sphere(position, radius, Vec3::splat(intensity)));
@@ -250,28 +249,6 @@ fn extreme_but_legal_lights_give_finite_light() {
 }
 
 #[test]
-fn buffers_of_another_scene_are_refused() {
-    let scene = assembled(&level());
-    let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(1));
-    let before = snapshot(&frame);
-    let larger = assembled(&floor_plan(&[[0, 0], [1, 0], [2, 0], [3, 0], [4, 0]], 0.6));
-    // As many of everything, and a door that the frame has no value for.
-    let mut with_a_door = level();
-    with_a_door.doors.push(Door {
-        connection: 0,
-        value: 1.0,
-    });
-    let with_a_door = assembled(&with_a_door);
-    for other in [&larger, &with_a_door] {
-        let error = frame
-            .solve(other, &[GOOD_SPHERE], &Openings, Bounces::Count(1))
-            .expect_err("the buffers are too small or too large");
-        assert!(matches!(error, FrameError::OtherScene { .. }), "{error}");
-        assert_eq!(snapshot(&frame), before);
-    }
-}
-
-#[test]
 fn without_lights_everything_is_zero() {
     let scene = assembled(&level());
     let mut frame = solved(&scene, &[GOOD_SPHERE], Bounces::Count(2));
@@ -283,13 +260,11 @@ fn without_lights_everything_is_zero() {
             limit: 5,
         },
     ] {
-        frame
-            .solve(&scene, &[], &Openings, bounces)
-            .expect("no lights are no fault");
+        frame.light_with(&[], bounces);
         let all = [
             frame.direct(),
             frame.indirect(),
-            frame.lightmap().as_flattened().to_vec(),
+            frame.lightmap().pixels().as_flattened().to_vec(),
         ];
         assert!(all.into_iter().flatten().all(|e| e == 0.0), "{bounces:?}");
     }
@@ -321,7 +296,7 @@ fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
     );
     let mut seen = [0; 3];
     for texel in 0..scene.texel_count() {
-        let angle = (scene.texel_position(texel) - position).angle_between(direction);
+        let angle = (position_of(&scene, texel) - position).angle_between(direction);
         // `angle_between` here is `f32`: off by up to 1e-3 for small angles.
         if angle < inner_angle - 1e-3 {
             assert_eq!(spot[texel], sphere[texel]);
@@ -359,7 +334,7 @@ fn directional_light_enters_through_outside_openings_only() {
     // The light's edges cut through texels of 1/16: about half a texel along each of them.
     assert!((flux / expected - 1.0).abs() < 0.05, "{flux} of {expected}");
     // Block 2 opens to the other side: light that travels to -x does not enter through its face -x.
-    for texel in open.blocks[2].texels.clone() {
+    for texel in open.level.blocks[2].texels.clone() {
         assert_eq!(direct[texel], [0.0; 3]);
     }
     check_against_rays(&open, direction, &direct);
@@ -370,9 +345,9 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
     // Texels whose ray passes the door's rim this closely are left to rounding.
     const RIM: f64 = 1e-6;
     for block in [0, 1] {
-        for texel in scene.blocks[block].texels.clone() {
-            let position = scene.texel_position(texel).as_dvec3();
-            let normal = scene.texel_normal(texel).as_dvec3();
+        for texel in scene.level.blocks[block].texels.clone() {
+            let position = position_of(scene, texel).as_dvec3();
+            let normal = normal_of(scene, texel).as_dvec3();
             let distance = (2.0 - position.x) / -direction.x;
             let door = position - direction * distance;
             let depth = door.y.min(1.0 - door.y).min(door.z.min(1.0 - door.z));
@@ -390,25 +365,23 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
             );
         }
     }
-    assert!(scene.blocks[1].shape.is_open(Face::PosX));
+    assert!(scene.level.blocks[1].shape.is_open(Face::PosX));
 }
 
 #[test]
 fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
     let level = Level::from_cells(&[[0, 0, 0]], Vec3::splat(0.5)).expect("one cell");
     let scene = assembled(&level);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let on_texel = Light::Spot {
-        position: scene.texel_position(0),
+        position: position_of(&scene, 0),
         radius: 0.1,
         intensity: Vec3::ONE,
         direction: Vec3::ONE,
         inner_angle: 0.5,
         outer_angle: 1.5,
     };
-    frame
-        .solve(&scene, &[on_texel], &Openings, Bounces::Count(1))
-        .expect("a light on a wall is inside");
+    frame.light_with(&[on_texel], Bounces::Count(1));
     assert!(frame.direct().iter().all(|e| e.is_finite()));
     assert!(frame.indirect().iter().sum::<f32>() > 0.0);
 
@@ -418,15 +391,13 @@ fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
         intensity: Vec3::ONE,
     };
     let careless = Rays(|from: DVec3, _| if from.x > 0.5 { f32::NAN } else { 7.0 });
-    frame
-        .solve(&scene, &[lamp], &careless, Bounces::Count(1))
-        .expect("a sound light");
+    frame.light_through(&[lamp], &careless, Bounces::Count(1));
     assert!(frame.direct().iter().all(|e| e.is_finite()));
     assert!(frame.indirect().iter().sum::<f32>() > 0.0);
 
     let wrong = vec![f32::NAN; frame.direct().len()];
     assert!(matches!(
-        frame.solve_from_direct(&scene, &wrong, Bounces::Count(1)),
+        frame.solve_from_direct(&wrong),
         Err(FrameError::Direct {
             faulty: Some(0),
             ..

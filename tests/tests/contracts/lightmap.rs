@@ -2,10 +2,11 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::scene::{Beyond, Scene};
+use mrt_runtime::BlockIndex;
+use mrt_runtime::low_level::level::placed::Beyond;
+use mrt_runtime::low_level::level::placed::PlacedBlock;
+use mrt_runtime::{Bounces, Frame, Level, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{assembled, floor_plan, solved, sphere};
 
 /// A loop, a junction and a room of 2x2: blocks of several orientations are joined, around pillars and not.
@@ -36,39 +37,47 @@ fn lit() -> (Level, Scene, Frame) {
     (level, scene, frame)
 }
 
-fn walls(scene: &Scene) -> Vec<(usize, Face)> {
-    let of = |(index, block): (usize, &mrt_runtime::modular::scene::SceneBlock)| {
+fn walls(scene: &Scene) -> Vec<(BlockIndex, Face)> {
+    let of = |(index, block): (usize, &PlacedBlock)| {
         block
             .shape
             .walls()
-            .map(move |face| (index, face))
+            .map(move |face| (BlockIndex::new(index), face))
             .collect::<Vec<_>>()
     };
-    scene.blocks.iter().enumerate().flat_map(of).collect()
+    scene.level.blocks.iter().enumerate().flat_map(of).collect()
 }
 
-fn look_up(scene: &Scene, frame: &Frame, block: usize, face: Face, u: f64, v: f64) -> [f32; 3] {
+fn look_up(
+    scene: &Scene,
+    frame: &Frame,
+    block: BlockIndex,
+    face: Face,
+    u: f64,
+    v: f64,
+) -> [f32; 3] {
     let pixel = scene
         .atlas
         .pixel(block, face, u as f32, v as f32)
         .expect("walls have a tile");
-    scene.atlas.sample(frame.lightmap(), pixel)
+    scene.atlas.sample(frame.lightmap().pixels(), pixel)
 }
 
 /// A texel of a canonical wall.
 fn texel(
     scene: &Scene,
     frame: &Frame,
-    block: usize,
+    block: BlockIndex,
     face: Face,
     row: usize,
     column: usize,
 ) -> [f32; 3] {
-    let offset = scene.blocks[block]
+    let offset = scene.level.blocks[block.get()]
         .shape
-        .wall_offset(face, scene.resolution)
+        .wall_offset(face, scene.level.resolution)
         .expect("walls have texels");
-    frame.indirect_at(scene, block, offset + row * scene.resolution + column)
+    let texel = offset + row * scene.level.resolution + column;
+    frame.indirect_at(block, texel).expect("a texel").to_array()
 }
 
 /// Coordinates on a face of a point of the unit cube.
@@ -85,11 +94,11 @@ fn sides(face: Face) -> impl Iterator<Item = Face> {
 
 /// An edge of a wall at an opening beyond which the wall goes on.
 struct JoinedEdge {
-    block: usize,
+    block: BlockIndex,
     face: Face,
     /// The opening.
     side: Face,
-    there: usize,
+    there: BlockIndex,
     /// The wall beyond.
     other_wall: Face,
     there_from_here: CubeRotation,
@@ -103,13 +112,13 @@ fn joined_edges(scene: &Scene) -> Vec<JoinedEdge> {
                 block: there,
                 here_from_there,
                 ..
-            } = scene.blocks[block].beyond[side.index()]
+            } = scene.level.blocks[block.get()].beyond[side.index()]
             else {
                 continue;
             };
             let there_from_here = here_from_there.inverse();
             let other_wall = there_from_here.face(face);
-            if !scene.blocks[there].shape.is_open(other_wall) {
+            if !scene.level.blocks[there.get()].shape.is_open(other_wall) {
                 edges.push(JoinedEdge {
                     block,
                     face,
@@ -136,8 +145,8 @@ fn edge_point(face: Face, side: Face, along: f64) -> DVec3 {
 #[test]
 fn every_pixel_of_every_tile_is_written_and_no_other() {
     let (_, scene, mut frame) = lit();
-    let tile = scene.resolution + 2;
-    let mut in_tile = vec![false; frame.lightmap().len()];
+    let tile = scene.level.resolution + 2;
+    let mut in_tile = vec![false; frame.lightmap().pixels().len()];
     for (block, face) in walls(&scene) {
         let corner = scene.atlas.pixel(block, face, 0.0, 0.0).expect("a tile");
         let (left, top) = (corner.x as usize - 1, corner.y as usize - 1);
@@ -148,19 +157,23 @@ fn every_pixel_of_every_tile_is_written_and_no_other() {
             }
         }
     }
-    for (pixel, inside) in frame.lightmap().iter().zip(&in_tile) {
+    for (pixel, inside) in frame.lightmap().pixels().iter().zip(&in_tile) {
         assert_eq!(pixel.iter().all(|&e| e > 0.0), *inside);
     }
-    frame
-        .solve(&scene, &[], &Openings, Bounces::Count(1))
-        .expect("no light is a sound list of lights");
-    assert!(frame.lightmap().iter().all(|pixel| *pixel == [0.0; 3]));
+    frame.light_with(&[], Bounces::Count(1));
+    assert!(
+        frame
+            .lightmap()
+            .pixels()
+            .iter()
+            .all(|pixel| *pixel == [0.0; 3])
+    );
 }
 
 #[test]
 fn a_lookup_at_a_texel_s_centre_is_the_texel() {
     let (_, scene, frame) = lit();
-    let resolution = scene.resolution;
+    let resolution = scene.level.resolution;
     for (block, face) in walls(&scene) {
         for row in 0..resolution {
             for column in 0..resolution {
@@ -215,8 +228,8 @@ fn light_is_continuous_on_the_way_across_an_opening() {
     let (_, scene, frame) = lit();
     // Two points this far from the edge on both sides.
     const DELTA: f64 = 1.0 / 1024.0;
-    let (tile, width) = (scene.resolution + 2, scene.atlas.width);
-    let map = frame.lightmap();
+    let (tile, width) = (scene.level.resolution + 2, scene.atlas.width);
+    let map = frame.lightmap().pixels();
     let mut largest_difference = 0.0f32;
     for (block, face) in walls(&scene) {
         let corner = scene.atlas.pixel(block, face, 0.0, 0.0).expect("a tile");
@@ -239,7 +252,7 @@ fn light_is_continuous_on_the_way_across_an_opening() {
         }
     }
     // A bilinear filter changes by at most one texel's difference a texel, twice that across the edge.
-    let bound = 2.0 * (DELTA * scene.resolution as f64) as f32 * largest_difference;
+    let bound = 2.0 * (DELTA * scene.level.resolution as f64) as f32 * largest_difference;
     for edge in joined_edges(&scene) {
         let JoinedEdge {
             block,
@@ -276,18 +289,18 @@ fn creases_and_outside_openings_repeat_the_edge() {
     let scene = assembled(&level);
     let light = sphere(Vec3::new(1.8, 0.4, 0.6), 0.1, Vec3::new(1.0, 2.0, 4.0));
     let frame = solved(&scene, &[light], Bounces::Count(3));
-    let half = 0.5 / scene.resolution as f64;
+    let half = 0.5 / scene.level.resolution as f64;
     let mut outside = 0;
     for (block, face) in walls(&scene) {
         for side in sides(face) {
-            let beyond = scene.blocks[block].beyond[side.index()];
+            let beyond = scene.level.blocks[block.get()].beyond[side.index()];
             if matches!(beyond, Beyond::Block { .. }) {
                 continue;
             }
             outside += usize::from(beyond == Beyond::Outside);
             // The outermost texels show what is around a pillar, if there is one.
-            for row in 1..scene.resolution - 1 {
-                let along = (row as f64 + 0.5) / scene.resolution as f64;
+            for row in 1..scene.level.resolution - 1 {
+                let along = (row as f64 + 0.5) / scene.level.resolution as f64;
                 let edge = edge_point(face, side, along);
                 let (u, v) = on_face(face, edge);
                 let at_edge = look_up(&scene, &frame, block, face, u, v);
@@ -305,17 +318,28 @@ fn creases_and_outside_openings_repeat_the_edge() {
 #[test]
 fn coordinates_outside_a_wall_are_clamped_and_openings_have_none() {
     let (_, scene, _) = lit();
-    let opening = scene.blocks[0].shape.openings[0].face;
-    assert_eq!(scene.atlas.pixel(0, opening, 0.5, 0.5), None);
+    let opening = scene.level.blocks[0].shape.openings[0].face;
     assert_eq!(
-        scene.atlas.pixel(scene.blocks.len(), Face::NegY, 0.5, 0.5),
+        scene.atlas.pixel(BlockIndex::new(0), opening, 0.5, 0.5),
         None
     );
-    let inside = scene.atlas.pixel(0, Face::NegY, 1.0, 0.0);
-    assert_eq!(scene.atlas.pixel(0, Face::NegY, 7.0, -3.0), inside);
+    assert_eq!(
+        scene.atlas.pixel(
+            BlockIndex::new(scene.level.blocks.len()),
+            Face::NegY,
+            0.5,
+            0.5
+        ),
+        None
+    );
+    let inside = scene.atlas.pixel(BlockIndex::new(0), Face::NegY, 1.0, 0.0);
+    assert_eq!(
+        scene.atlas.pixel(BlockIndex::new(0), Face::NegY, 7.0, -3.0),
+        inside
+    );
     let uv = scene
         .atlas
-        .texture_coordinate(0, Face::NegY, 1.0, 1.0)
+        .texture_coordinate(BlockIndex::new(0), Face::NegY, 1.0, 1.0)
         .expect("a wall");
     assert!(uv.cmpgt(glam::Vec2::ZERO).all() && uv.cmplt(glam::Vec2::ONE).all());
 }

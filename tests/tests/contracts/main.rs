@@ -3,6 +3,7 @@
 mod bake_reproducible;
 mod direct_light;
 mod doors;
+mod facade;
 mod frame;
 mod lightmap;
 mod old_versions;

@@ -3,12 +3,12 @@
 use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::modular::dictionary::{Dictionary, StoredDictionary};
-use mrt_runtime::modular::dictionary_file::DICTIONARY_VERSION;
-use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::modular::dictionary::StoredDictionary;
+use mrt_runtime::low_level::modular::dictionary_file::DICTIONARY_VERSION;
+use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Frame, Level, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{CONVERGED, floor_plan, largest_difference, solved, sphere};
 
 const BYTE_BUDGET: u64 = 16 << 20;
@@ -25,7 +25,8 @@ fn file(version: u32) -> Vec<u8> {
 }
 
 fn read(version: u32) -> Dictionary {
-    Dictionary::from_bytes(&file(version), &mut ByteBudget::new(BYTE_BUDGET)).expect("readable")
+    Dictionary::from_bytes_within(&file(version), &mut ByteBudget::new(BYTE_BUDGET))
+        .expect("readable")
 }
 
 /// A corridor with branches and a room of four: every shape but the closed one.
@@ -93,14 +94,13 @@ fn version_1_lights_a_level_as_its_program_did() {
         negligible: Some(0.0),
         ..AssembleConfig::default()
     };
-    let scene = assemble(&level(), &read(1), &config).expect("it fits");
-    let mut frame = Frame::new(&scene);
+    let scene = Scene::assemble(&level(), &read(1), &config).expect("it fits");
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     for (bounces, expected) in [1, 3].into_iter().zip(&VERSION_1_FIGURES) {
-        frame
-            .solve(&scene, &lights, &Openings, Bounces::Count(bounces))
-            .expect("the lights are sound");
-        let found: Vec<[f32; 3]> = (0..scene.blocks.len())
-            .map(|block| frame.indirect_at(&scene, block, 37))
+        frame.light_with(&lights, Bounces::Count(bounces));
+        let found: Vec<[f32; 3]> = (0..scene.level.blocks.len())
+            .map(|block| frame.indirect_at(BlockIndex::new(block), 37))
+            .map(|light| light.expect("a texel").to_array())
             .collect();
         // Frames have since learnt to scale a channel in which truncation makes light out of nothing, as it does in
         // a closed level.
@@ -135,7 +135,7 @@ fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
             coupling,
             ..AssembleConfig::default()
         };
-        let scene = assemble(&level(), &dictionary, &config).expect("it fits");
+        let scene = Scene::assemble(&level(), &dictionary, &config).expect("it fits");
         let light = sphere(vec3(0.4, 0.7, 0.5), 0.15, Vec3::ONE);
         solved(&scene, &[light], CONVERGED).indirect()
     };
@@ -146,11 +146,15 @@ fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
 fn every_version_lights_a_room() {
     for version in 1..=DICTIONARY_VERSION {
         let level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-        let scene = assemble(&level, &read(version), &AssembleConfig::default()).expect("it fits");
+        let scene =
+            Scene::assemble(&level, &read(version), &AssembleConfig::default()).expect("it fits");
         let light = sphere(vec3(0.5, 0.5, 0.5), 0.15, Vec3::ONE);
         let frame = solved(&scene, &[light], Bounces::Count(2));
         for block in 0..3 {
-            let lit = frame.indirect_at(&scene, block, 7)[0];
+            let lit = frame
+                .indirect_at(BlockIndex::new(block), 7)
+                .expect("a texel")
+                .x;
             assert!(lit > 1e-3, "version {version}, block {block}: {lit}");
         }
     }

@@ -4,19 +4,17 @@ use glam::Vec3;
 use mrt_core::container::ByteBudget;
 use mrt_core::linalg::matrix::{MatrixView, multiply, multiply_add};
 use mrt_core::storage::Storage;
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::opening_responses::responses_by_opening;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::blocks::maze;
+use mrt_runtime::low_level::modular::opening_responses::responses_by_opening;
+use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Frame, Light, Scene};
+use mrt_tests::FrameForTests;
 
 #[test]
 fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
     let bytes = include_bytes!("../../../assets/versions/2.mrt");
     let dictionary =
-        Dictionary::from_bytes(bytes, &mut ByteBudget::new(16 << 20)).expect("a dictionary");
+        Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(16 << 20)).expect("a dictionary");
     let level = maze(9, Vec3::splat(0.5), 3);
     for coupling in [Coupling::Table, Coupling::Lightfield] {
         let config = AssembleConfig {
@@ -25,24 +23,26 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
             negligible: Some(0.0),
             ..AssembleConfig::default()
         };
-        let scene = assemble(&level, &dictionary, &config).expect("a maze is a level");
+        let scene = Scene::assemble(&level, &dictionary, &config).expect("a maze is a level");
         let light = Light::Sphere {
             position: level.blocks[4].warp.center().as_vec3(),
             radius: 0.1,
             intensity: Vec3::new(1.0, 0.5, 0.2),
         };
-        let mut frame = Frame::new(&scene);
-        frame
-            .solve(&scene, &[light], &Openings, Bounces::Count(1))
-            .expect("the light is in a block");
+        let mut frame = Frame::new(&scene, FrameConfig::default());
+        frame.light_with(&[light], Bounces::Count(1));
         let (b, expected) = (frame.coefficients(), frame.indirect());
         let joint_count = scene.blocks.last().map_or(0, |block| block.joint.end);
         let mut joint = vec![0.0; 3 * joint_count];
         let all =
             responses_by_opening(&level, &scene, &dictionary, &config).expect("it is the scene");
         for arrival in &all {
-            let (target, source) = (&scene.blocks[arrival.target], &scene.blocks[arrival.source]);
-            let entry = dictionary.shape_index(target.shape).expect("it is used");
+            let (target, source) = (
+                &scene.blocks[arrival.target.get()],
+                &scene.blocks[arrival.source.get()],
+            );
+            let shape = scene.level.blocks[arrival.target.get()].shape;
+            let entry = dictionary.shape_index(shape).expect("it is used");
             let opening = &dictionary.shapes[entry].openings[arrival.opening];
             let of_source = &b[3 * source.coefficients.start..3 * source.coefficients.end];
             let of_source = MatrixView::new(source.coefficients.len(), 3, of_source);
@@ -54,7 +54,7 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
             );
         }
         let mut found = vec![0.0; expected.len()];
-        for block in &scene.blocks {
+        for (block, placed) in scene.blocks.iter().zip(&scene.level.blocks) {
             let own = &b[3 * block.coefficients.start..3 * block.coefficients.end];
             let joint = &mut joint[3 * block.joint.start..3 * block.joint.end];
             for channel in 0..3 {
@@ -63,9 +63,9 @@ fn responses_by_opening_add_up_to_the_transport_of_the_scene() {
                     joint[channel * stride + k] += own[channel * modes + k];
                 }
             }
-            let entry = dictionary.shape_index(block.shape).expect("it is used");
+            let entry = dictionary.shape_index(placed.shape).expect("it is used");
             let joint = MatrixView::new(block.joint.len(), 3, joint);
-            let out = &mut found[3 * block.texels.start..3 * block.texels.end];
+            let out = &mut found[3 * placed.texels.start..3 * placed.texels.end];
             multiply_add(dictionary.shapes[entry].joint_basis.view(), joint, out);
         }
         let largest = expected.iter().fold(0.0f32, |m, x| m.max(x.abs()));

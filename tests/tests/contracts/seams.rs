@@ -8,9 +8,11 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
 use mrt_core::reference::radiosity::transport::Transport;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::scene::{Beyond, Scene};
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::level::placed::Beyond;
+use mrt_runtime::{Bounces, Frame, Level, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{
     Random, assembled, by_texel, closed_floor_plans, exact_of, floor_plan, in_level_order,
     random_cells, solved, sphere,
@@ -21,22 +23,25 @@ const LARGEST_STEP: f64 = 0.03;
 
 /// The texel of a wall next to one of its sides at position `along` of the edge, and its centre.
 fn beside(scene: &Scene, block: usize, wall: Face, side: Face, along: DVec3) -> (usize, DVec3) {
-    let step = 0.5 / scene.resolution as f64;
+    let step = 0.5 / scene.level.resolution as f64;
     let mut point = along;
     point[side.axis()] = if side.is_positive() { 1.0 - step } else { step };
     point[wall.axis()] = if wall.is_positive() { 1.0 } else { 0.0 };
-    let offset = scene.blocks[block]
+    let offset = scene.level.blocks[block]
         .shape
-        .wall_offset(wall, scene.resolution)
+        .wall_offset(wall, scene.level.resolution)
         .expect("a wall");
-    (offset + wall.texel_index(point, scene.resolution), point)
+    (
+        offset + wall.texel_index(point, scene.level.resolution),
+        point,
+    )
 }
 
 /// The step of a signal (texels in the order of the scene's) at each position of each edge between joined walls,
 /// and where it is.
 fn steps(scene: &Scene, signal: &[f64]) -> Vec<(f64, DVec3)> {
     let mut steps = Vec::new();
-    for (index, block) in scene.blocks.iter().enumerate() {
+    for (index, block) in scene.level.blocks.iter().enumerate() {
         for side in Face::ALL {
             let Beyond::Block {
                 block: there,
@@ -47,6 +52,7 @@ fn steps(scene: &Scene, signal: &[f64]) -> Vec<(f64, DVec3)> {
                 continue;
             };
             // Each pair once.
+            let there = there.get();
             if there < index {
                 continue;
             }
@@ -57,16 +63,17 @@ fn steps(scene: &Scene, signal: &[f64]) -> Vec<(f64, DVec3)> {
                 .filter(|wall| wall.axis() != side.axis())
             {
                 let wall_there = back.face(wall);
-                if scene.blocks[there].shape.is_open(wall_there) {
+                if scene.level.blocks[there].shape.is_open(wall_there) {
                     continue;
                 }
-                for k in 0..scene.resolution {
-                    let along = DVec3::splat((k as f64 + 0.5) / scene.resolution as f64);
+                for k in 0..scene.level.resolution {
+                    let along = DVec3::splat((k as f64 + 0.5) / scene.level.resolution as f64);
                     let (here, point) = beside(scene, index, wall, side, along);
                     let (beyond, _) =
                         beside(scene, there, wall_there, side_there, back.point(point));
-                    let [here, beyond] = [(index, here), (there, beyond)]
-                        .map(|(block, texel)| signal[scene.blocks[block].texels.start + texel]);
+                    let [here, beyond] = [(index, here), (there, beyond)].map(|(block, texel)| {
+                        signal[scene.level.blocks[block].texels.start + texel]
+                    });
                     steps.push(((here - beyond).abs(), block.warp.point(point)));
                 }
             }
@@ -89,10 +96,14 @@ fn exact_bounce(level: &Level, scene: &Scene, transport: &Transport, frame: &Fra
     let mut out = vec![0.0; scene.texel_count()];
     for (index, block) in level.blocks.iter().enumerate() {
         for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
-            for row in 0..scene.resolution {
-                for column in 0..scene.resolution {
-                    let texel = scene.level_texel(index, face, row, column).expect("a wall");
-                    out[scene.blocks[index].texels.start + texel] = next.next().expect("a value");
+            for row in 0..scene.level.resolution {
+                for column in 0..scene.level.resolution {
+                    let texel = scene
+                        .level
+                        .level_texel(BlockIndex::new(index), face, row, column)
+                        .expect("a wall");
+                    out[scene.level.blocks[index].texels.start + texel] =
+                        next.next().expect("a value");
                 }
             }
         }
@@ -110,7 +121,7 @@ fn red(scene: &Scene, frame: &Frame) -> Vec<f64> {
 /// Largest step that the exact light does not have, over the level's mean: the step of the error.
 fn check(name: &str, level: &Level, lights: &[Vec3]) {
     let scene = assembled(level);
-    let transport = Transport::build(&exact_of(level, scene.resolution));
+    let transport = Transport::build(&exact_of(level, scene.level.resolution));
     for &position in lights {
         let light = sphere(position, 0.1, Vec3::ONE);
         let frame = solved(&scene, &[light], Bounces::Count(1));
@@ -186,14 +197,8 @@ fn joined_walls_of_random_mazes_show_no_step() {
 fn uniform_light_shows_no_step() {
     for (name, cells) in closed_floor_plans() {
         let scene = assembled(&floor_plan(&cells, 0.5));
-        let mut frame = Frame::new(&scene);
-        frame
-            .solve_from_direct(
-                &scene,
-                &vec![1.0; 3 * scene.texel_count()],
-                Bounces::Count(1),
-            )
-            .expect("light of the right length");
+        let mut frame = Frame::new(&scene, FrameConfig::default());
+        frame.light_from(&vec![1.0; 3 * scene.texel_count()], Bounces::Count(1));
         let ours = red(&scene, &frame);
         let mean = ours.iter().sum::<f64>() / ours.len() as f64;
         let largest = steps(&scene, &ours)

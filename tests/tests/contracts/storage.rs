@@ -3,16 +3,14 @@
 use glam::{DVec3, Vec3, dvec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::text;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::modular::dictionary::{
-    Dictionary, OperatorMatrix, StoredDictionary, Variant, WarpTransport,
+use mrt_runtime::FrameConfig;
+use mrt_runtime::blocks::WarpTransport;
+use mrt_runtime::low_level::modular::dictionary::{OperatorMatrix, StoredDictionary, Variant};
+use mrt_runtime::low_level::modular::pack::{PackConfig, pack};
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, Level, Light, Scene,
 };
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::pack::{PackConfig, pack};
+use mrt_tests::FrameForTests;
 use mrt_tests::{DEFAULT_BYTES, corridor, floor_plan, sphere};
 
 const BYTE_BUDGET: u64 = 64 << 20;
@@ -35,16 +33,17 @@ const INT8_TOLERANCE: f64 = 5e-3;
 /// The mobile preset at 6² texels in the newest format.
 fn mobile() -> Dictionary {
     let bytes = include_bytes!("../../../assets/versions/2.mrt");
-    Dictionary::from_bytes(bytes, &mut ByteBudget::new(BYTE_BUDGET)).expect("the file is sound")
+    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(BYTE_BUDGET))
+        .expect("the file is sound")
 }
 
 fn standard() -> Dictionary {
-    Dictionary::from_bytes(DEFAULT_BYTES, &mut ByteBudget::new(BYTE_BUDGET)).expect("sound")
+    Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(BYTE_BUDGET)).expect("sound")
 }
 
 fn maze() -> Level {
     let level = include_str!("../../../assets/maze.level.toml");
-    text::from_text(level).expect("the maze is sound")
+    Level::from_text(level).expect("the maze is sound")
 }
 
 fn levels() -> Vec<(&'static str, Level)> {
@@ -99,14 +98,12 @@ fn lit_to<M: OperatorMatrix>(
         negligible: Some(0.0),
         ..AssembleConfig::default()
     };
-    let scene = assemble(level, dictionary, &config).expect("the level fits the dictionary");
-    let mut frame = Frame::new(&scene);
+    let scene = Scene::assemble(level, dictionary, &config).expect("the level fits the dictionary");
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let mut signals = Vec::new();
     for lights in light_sets(level) {
         for bounces in [Bounces::Count(1), Bounces::Count(4)] {
-            frame
-                .solve(&scene, &lights, &Openings, bounces)
-                .expect("the lights are sound");
+            frame.light_with(&lights, bounces);
             signals.push(frame.indirect());
         }
     }
@@ -286,7 +283,7 @@ fn a_packed_dictionary_says_what_another_level_lacks() {
             coupling,
             ..AssembleConfig::default()
         };
-        assemble(to, &packed, &config).expect_err("it was packed for another level")
+        Scene::assemble(to, &packed, &config).expect_err("it was packed for another level")
     };
     let short = floor_plan(&corridor(2), 0.5);
     let long = floor_plan(&corridor(4), 0.5);
@@ -302,7 +299,7 @@ fn a_packed_dictionary_says_what_another_level_lacks() {
     both.paths = pack(&straight, &dictionary, &config)
         .expect("it fits")
         .paths;
-    let error = assemble(&zigzag, &both, &AssembleConfig::default()).expect_err("no corner");
+    let error = Scene::assemble(&zigzag, &both, &AssembleConfig::default()).expect_err("no corner");
     match &error {
         AssembleError::MissingPath { word, .. } => assert_eq!(word, "zx", "{error}"),
         other => panic!("{other}"),

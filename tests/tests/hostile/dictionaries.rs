@@ -2,9 +2,9 @@
 
 use mrt_core::container::{ByteBudget, Container, ElementType, Format, Writer};
 use mrt_core::storage::{Storage, f16};
-use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::modular::dictionary::{Dictionary, StoredDictionary, Variant, WarpTransport};
-use mrt_runtime::modular::dictionary_file::DictionaryError;
+use mrt_runtime::blocks::WarpTransport;
+use mrt_runtime::low_level::modular::dictionary::{StoredDictionary, Variant};
+use mrt_runtime::{AssembleConfig, Coupling, Dictionary, DictionaryError, Scene};
 use mrt_tests::{Random, floor_plan};
 
 const BYTE_BUDGET: u64 = 64 << 20;
@@ -89,7 +89,7 @@ impl Parts {
 }
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
-    Dictionary::from_bytes(bytes, &mut ByteBudget::new(BYTE_BUDGET))
+    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(BYTE_BUDGET))
 }
 
 /// Files of both versions, the newer one with variants and in every storage.
@@ -276,14 +276,14 @@ fn budgets_are_kept() {
         let bytes = parts.bytes();
         let needed = {
             let mut budget = ByteBudget::new(BYTE_BUDGET);
-            Dictionary::from_bytes(&bytes, &mut budget).expect("sound");
+            Dictionary::from_bytes_within(&bytes, &mut budget).expect("sound");
             BYTE_BUDGET - budget.remaining()
         };
         for share in 0..8 {
             let mut budget = ByteBudget::new(needed * share / 8);
-            Dictionary::from_bytes(&bytes, &mut budget).expect_err("less than it takes");
+            Dictionary::from_bytes_within(&bytes, &mut budget).expect_err("less than it takes");
         }
-        Dictionary::from_bytes(&bytes, &mut ByteBudget::new(needed)).expect("just enough");
+        Dictionary::from_bytes_within(&bytes, &mut ByteBudget::new(needed)).expect("just enough");
     }
 }
 
@@ -310,7 +310,7 @@ fn random_damage_causes_no_panic() {
                     ..AssembleConfig::default()
                 };
                 // A damaged dictionary may lack what the level needs.
-                let _ = assemble(&level, &dictionary, &config);
+                let _ = Scene::assemble(&level, &dictionary, &config);
             }
         }
     }

@@ -2,21 +2,21 @@
 
 use mrt_core::container::{ByteBudget, ContainerError, Format, Writer};
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::{Hole, SHAPES};
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::modular::dictionary::{
-    Dictionary, LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators,
-    Sources, StoredDictionary,
+use mrt_runtime::blocks::SHAPES;
+use mrt_runtime::low_level::level::shape::Hole;
+use mrt_runtime::low_level::modular::dictionary::{
+    LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
+    StoredDictionary,
 };
-use mrt_runtime::modular::dictionary_file::{
-    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES,
-    MAX_RESOLUTION, MAX_VARIANTS,
+use mrt_runtime::low_level::modular::dictionary_file::{
+    DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, MAX_MODES, MAX_PROBES, MAX_RESOLUTION, MAX_VARIANTS,
 };
-use mrt_runtime::modular::path::{MAX_WORD, Word};
+use mrt_runtime::low_level::modular::path::{MAX_WORD, Word};
+use mrt_runtime::{AssembleConfig, AssembleError, Dictionary, DictionaryError, Scene};
 use mrt_tests::{DEFAULT_BYTES, Random, default_dictionary, floor_plan};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
-    Dictionary::from_bytes(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
+    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
 }
 
 /// A dictionary of two shapes with 2² texels, one probe and two modes of everything; foreign light adds a third.
@@ -439,11 +439,11 @@ fn a_small_budget_is_kept() {
     let bytes = small().to_bytes().expect("it fits");
     let enough = (0..20_000)
         .step_by(50)
-        .find(|&size| Dictionary::from_bytes(&bytes, &mut ByteBudget::new(size)).is_ok())
+        .find(|&size| Dictionary::from_bytes_within(&bytes, &mut ByteBudget::new(size)).is_ok())
         .expect("the dictionary is small");
     assert!(enough > 1000, "{enough}");
     for size in (0..enough).step_by(50) {
-        let error = Dictionary::from_bytes(&bytes, &mut ByteBudget::new(size))
+        let error = Dictionary::from_bytes_within(&bytes, &mut ByteBudget::new(size))
             .expect_err("below the smallest that is enough");
         let limit = matches!(
             error,
@@ -453,7 +453,7 @@ fn a_small_budget_is_kept() {
     }
     // What was promised is all that counts: 4 bytes a number, not more than the file.
     let matrices = default_dictionary().bytes() as u64;
-    let spent = Dictionary::from_bytes(DEFAULT_BYTES, &mut ByteBudget::new(matrices / 2));
+    let spent = Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(matrices / 2));
     assert!(spent.is_err());
 }
 
@@ -462,7 +462,7 @@ fn a_dictionary_that_lacks_a_shape_says_which() {
     let mut packed = default_dictionary().clone();
     packed.shapes.retain(|entry| entry.shape.name != "straight");
     let level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-    let error = assemble(&level, &packed, &AssembleConfig::default())
+    let error = Scene::assemble(&level, &packed, &AssembleConfig::default())
         .map(|_| ())
         .expect_err("incomplete");
     let missing = matches!(

@@ -3,9 +3,8 @@
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::HexahedronError;
-use mrt_runtime::level::block::{Connection, Level, LevelError, Opening};
-use mrt_runtime::level::text::{LevelTextError, from_text, to_text};
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
+use mrt_runtime::blocks::{Connection, Opening};
+use mrt_runtime::{AssembleConfig, AssembleError, Level, LevelError, LevelTextError, Scene};
 use mrt_tests::{default_dictionary, floor_plan};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
@@ -21,7 +20,7 @@ fn fault(change: impl FnOnce(&mut Level)) -> LevelError {
     change(&mut level);
     let error = level.check().expect_err("the level is faulty");
     // Assembly finds the same, and text that was written says so when it is read.
-    let assembled = assemble(&level, default_dictionary(), &AssembleConfig::default());
+    let assembled = Scene::assemble(&level, default_dictionary(), &AssembleConfig::default());
     // NaN is not equal to itself.
     let same = |other: &LevelError| other.to_string() == error.to_string();
     assert!(matches!(assembled, Err(AssembleError::Level(other)) if same(&other)));
@@ -152,7 +151,7 @@ fn interfaces_rolled_by_a_quarter_turn_are_refused() {
         let mut level = pair();
         level.blocks[1].orientation = CubeRotation::from_images(x, y).expect("perpendicular");
         assert_eq!(level.check(), Ok(()));
-        let error = assemble(&level, default_dictionary(), &AssembleConfig::default())
+        let error = Scene::assemble(&level, default_dictionary(), &AssembleConfig::default())
             .map(|_| ())
             .expect_err("rolled");
         let named = matches!(
@@ -237,7 +236,7 @@ fn tokens(text: &str) -> Vec<String> {
 fn sound_text() -> String {
     let mut level = floor_plan(&[[0, 0], [1, 0], [1, 1], [2, 0]], 0.5);
     level.blocks[2].albedo[2] = Vec3::new(0.1, 0.2, 0.3);
-    to_text(&level).expect("levels have text")
+    level.to_text().expect("levels have text")
 }
 
 proptest! {
@@ -270,16 +269,16 @@ proptest! {
             }
         }
         // What is still a level must pass all that follows.
-        if let Ok(level) = from_text(&tokens.concat()) {
+        if let Ok(level) = Level::from_text(&tokens.concat()) {
             prop_assert_eq!(level.check(), Ok(()));
-            let text = to_text(&level).expect("a sound level has text");
-            prop_assert_eq!(from_text(&text).expect("and is read again"), level.clone());
+            let text = level.to_text().expect("a sound level has text");
+            prop_assert_eq!(Level::from_text(&text).expect("and is read again"), level.clone());
             if level.blocks.len() <= 8 {
                 let config = AssembleConfig {
                     max_depth: 2,
                     ..AssembleConfig::default()
                 };
-                match assemble(&level, default_dictionary(), &config) {
+                match Scene::assemble(&level, default_dictionary(), &config) {
                     Ok(_) | Err(AssembleError::RolledInterface { .. }) => {}
                     Err(other) => prop_assert!(false, "{}", other),
                 }
@@ -291,7 +290,7 @@ proptest! {
 #[test]
 fn text_that_is_no_level_says_why() {
     let sound = sound_text();
-    let error = |text: &str| from_text(text).expect_err("not a level");
+    let error = |text: &str| Level::from_text(text).expect_err("not a level");
     assert!(matches!(error(""), LevelTextError::NotALevel { .. }));
     assert!(matches!(
         error(&sound.replacen("version = 1", "version = 2\nfog = true", 1)),
@@ -341,7 +340,7 @@ fn far_levels_and_absurd_settings_are_refused() {
         ..AssembleConfig::default()
     };
     let refused = |level: &Level, config| {
-        assemble(level, default_dictionary(), &config)
+        Scene::assemble(level, default_dictionary(), &config)
             .map(|_| ())
             .expect_err("refused")
     };

@@ -10,7 +10,7 @@ use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactScene, Side};
 use mrt_dictionary::modular::light_prior::warped::warped_direct_samples;
-use mrt_runtime::level::shape::SHAPES;
+use mrt_runtime::blocks::SHAPES;
 use mrt_tests::warped::*;
 
 const LENGTH: f64 = 4.0;

@@ -10,11 +10,12 @@ use mrt_core::reference::error_measure::rel_l2;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::{Block, Connection, Level, Opening};
-use mrt_runtime::level::shape::{Hole, Shape};
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::Bounces;
+use mrt_runtime::blocks::{Block, Connection, Opening, Shape};
+use mrt_runtime::low_level::level::shape::Hole;
+use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Level, Scene};
+use mrt_tests::FrameForTests;
+use mrt_tests::normal_of;
+use mrt_tests::position_of;
 use mrt_tests::{by_texel, solved, sphere};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -42,7 +43,7 @@ fn dictionary() -> &'static Dictionary {
 /// A room, a second one behind a hole at x = 1, and a dead end beyond the second's missing face at x = 2.
 fn level(hole: Hole, albedo: f32) -> Level {
     let (room, passage) = match hole {
-        Hole::Door => ("door", "doorway"),
+        Hole::Doorway => ("door", "doorway"),
         Hole::Window => ("window", "window_end"),
     };
     let place = |name: &str, orientation: CubeRotation, x: f64| {
@@ -143,17 +144,17 @@ fn truth(hole: Hole, pieces: &[Piece], block: usize, point: DVec3, normal: DVec3
 }
 
 /// Light that falls through the hole on other walls directly; the truth has the lit room's only.
-fn only_first_block(scene: &mrt_runtime::modular::scene::Scene, direct: &[f32]) -> Vec<f32> {
+fn only_first_block(scene: &mrt_runtime::Scene, direct: &[f32]) -> Vec<f32> {
     let mut direct = direct.to_vec();
-    direct[3 * scene.blocks[0].texels.end..].fill(0.0);
+    direct[3 * scene.level.blocks[0].texels.end..].fill(0.0);
     direct
 }
 
 #[test]
 fn rooms_behind_holes_are_as_bright_as_they_should_be() {
     let albedo = 0.8;
-    for (hole, bounds) in [(Hole::Door, DOOR_ERROR), (Hole::Window, WINDOW_ERROR)] {
-        let scene = assemble(
+    for (hole, bounds) in [(Hole::Doorway, DOOR_ERROR), (Hole::Window, WINDOW_ERROR)] {
+        let scene = Scene::assemble(
             &level(hole, albedo),
             dictionary(),
             &AssembleConfig::default(),
@@ -162,15 +163,13 @@ fn rooms_behind_holes_are_as_bright_as_they_should_be() {
         let lamp = sphere(LAMP.as_vec3(), 0.1, Vec3::ONE);
         let mut frame = solved(&scene, &[lamp], Bounces::Count(0));
         let direct = only_first_block(&scene, &frame.direct());
-        frame
-            .solve_from_direct(&scene, &direct, Bounces::Count(1))
-            .expect("light of the right length");
+        frame.light_from(&direct, Bounces::Count(1));
         let found = by_texel(&scene, &frame.indirect());
         let pieces = pieces(hole);
         for (block, bound) in bounds.into_iter().enumerate() {
             let mut ours = Vec::new();
             let mut theirs = Vec::new();
-            let placed = &scene.blocks[block];
+            let placed = &scene.level.blocks[block];
             for (texel, (face, center)) in
                 placed.texels.clone().zip(placed.shape.texels(RESOLUTION))
             {
@@ -178,8 +177,8 @@ fn rooms_behind_holes_are_as_bright_as_they_should_be() {
                     assert_eq!(found[texel], [0.0; 3], "what is not there is dark");
                     continue;
                 }
-                let point = scene.texel_position(texel).as_dvec3();
-                let normal = scene.texel_normal(texel).as_dvec3();
+                let point = position_of(&scene, texel).as_dvec3();
+                let normal = normal_of(&scene, texel).as_dvec3();
                 ours.push(f64::from(found[texel][0]));
                 theirs.push(f64::from(albedo) * truth(hole, &pieces, block, point, normal));
             }
@@ -199,7 +198,7 @@ const WINDOW_ERROR: [f64; 3] = [0.02, 0.10, 0.08];
 #[test]
 fn direct_light_falls_through_the_hole_and_nowhere_else() {
     for hole in Hole::ALL {
-        let scene = assemble(&level(hole, 0.5), dictionary(), &AssembleConfig::default())
+        let scene = Scene::assemble(&level(hole, 0.5), dictionary(), &AssembleConfig::default())
             .expect("the level fits the dictionary");
         let frame = solved(
             &scene,
@@ -209,9 +208,9 @@ fn direct_light_falls_through_the_hole_and_nowhere_else() {
         let direct = by_texel(&scene, &frame.direct());
         let mut lit = 0;
         for block in 1..3 {
-            for texel in scene.blocks[block].texels.clone() {
-                let point = scene.texel_position(texel).as_dvec3();
-                let normal = scene.texel_normal(texel).as_dvec3();
+            for texel in scene.level.blocks[block].texels.clone() {
+                let point = position_of(&scene, texel).as_dvec3();
+                let normal = normal_of(&scene, texel).as_dvec3();
                 let faces = normal.dot(LAMP - point) > 1e-6;
                 let expected = faces && passes(hole, LAMP, point);
                 assert_eq!(direct[texel][0] > 0.0, expected, "{hole:?}, {point}");

@@ -11,11 +11,12 @@ use mrt_dictionary::modular::paths::transport::{
     EMITTER, Gather, RECEIVER, Signals, gather, texel_at,
 };
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::shape::Hole;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::path::{Crossing, Word, response_frame};
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::level::shape::Hole;
+use mrt_runtime::low_level::modular::path::{Crossing, Word, response_frame};
+use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{Random, exact_of, floor_plan, in_level_order, largest_difference};
 use std::sync::OnceLock;
 
@@ -65,7 +66,7 @@ fn all_modes_together_are_exact_form_factors_through_openings() {
     ];
     for (name, cells) in plans {
         let level = floor_plan(cells, 1.0);
-        let scene = assemble(&level, full_rank(), &exact_config()).expect("it fits");
+        let scene = Scene::assemble(&level, full_rank(), &exact_config()).expect("it fits");
         let exact = exact_of(&level, RESOLUTION);
         let transport = Transport::build(&exact);
         // Light on one block at a time, so that each path counts for itself.
@@ -108,18 +109,19 @@ const FULL_RANK: f64 = 1e-4;
 
 /// One bounce of direct light given in the order of the level.
 fn first_bounce(
-    level: &mrt_runtime::level::block::Level,
-    scene: &mrt_runtime::modular::scene::Scene,
+    level: &mrt_runtime::Level,
+    scene: &mrt_runtime::Scene,
     light: &[[f32; 3]],
 ) -> Vec<[f32; 3]> {
     let mut direct = vec![0.0; 3 * scene.texel_count()];
     let mut next = light.iter();
     for (index, block) in level.blocks.iter().enumerate() {
-        let texels = &scene.blocks[index].texels;
+        let texels = &scene.level.blocks[index].texels;
         for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
             for k in 0..RESOLUTION * RESOLUTION {
                 let texel = scene
-                    .level_texel(index, face, k / RESOLUTION, k % RESOLUTION)
+                    .level
+                    .level_texel(BlockIndex::new(index), face, k / RESOLUTION, k % RESOLUTION)
                     .expect("walls have texels");
                 let value = next.next().expect("one value a texel");
                 for c in 0..3 {
@@ -128,10 +130,8 @@ fn first_bounce(
             }
         }
     }
-    let mut frame = Frame::new(scene);
-    frame
-        .solve_from_direct(scene, &direct, Bounces::Count(1))
-        .expect("light of the right length");
+    let mut frame = Frame::new(scene, FrameConfig::default());
+    frame.light_from(&direct, Bounces::Count(1));
     in_level_order(level, scene, &frame.indirect())
 }
 

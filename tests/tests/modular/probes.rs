@@ -6,14 +6,13 @@ use mrt_core::lighting::sh;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::{ProbeOrder, irradiance_from_probe};
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::output::probes::irradiance_from_probe;
+use mrt_runtime::{
+    AssembleConfig, Bounces, Dictionary, Frame, Level, Light, Outputs, ProbeOrder, Scene,
+};
+use mrt_tests::FrameForTests;
 use std::sync::OnceLock;
 
 fn dictionary() -> &'static Dictionary {
@@ -33,7 +32,7 @@ fn dictionary() -> &'static Dictionary {
 
 fn scene_of(cells: &[[i32; 3]]) -> Scene {
     let level = Level::from_cells(cells, Vec3::splat(0.6)).expect("cells");
-    assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level")
+    Scene::assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level")
 }
 
 fn lit(scene: &Scene, position: Vec3, order: ProbeOrder) -> Frame {
@@ -42,15 +41,19 @@ fn lit(scene: &Scene, position: Vec3, order: ProbeOrder) -> Frame {
         probes: Some(order),
         vector: false,
     };
-    let mut frame = Frame::with_outputs(scene, outputs);
+    let mut frame = Frame::new(
+        scene,
+        FrameConfig {
+            outputs,
+            ..FrameConfig::default()
+        },
+    );
     let lamp = Light::Sphere {
         position,
         radius: 0.1,
         intensity: Vec3::new(1.0, 0.5, 0.25),
     };
-    frame
-        .solve(scene, &[lamp], &Openings, Bounces::Count(8))
-        .expect("a light");
+    frame.light_with(&[lamp], Bounces::Count(8));
     frame
 }
 
@@ -66,7 +69,7 @@ fn probes_next_to_a_wall_give_its_irradiance() {
     let frame = lit(&scene, vec3(0.5, 0.6, 0.4), ProbeOrder::L2);
     let probes = frame.probes().expect("asked for");
     let mut worst = 0.0f64;
-    for (index, block) in scene.blocks.iter().enumerate() {
+    for (index, block) in scene.level.blocks.iter().enumerate() {
         for wall in block.shape.walls() {
             // Means over the wall: the probes of its layer against its texels.
             let n = probes.per_axis();
@@ -75,7 +78,9 @@ fn probes_next_to_a_wall_give_its_irradiance() {
                 let light = |k: usize| {
                     let on_wall = wall.texel_center(n, k / n, k % n);
                     let point = on_wall - wall.outward() * (depth / n as f64);
-                    let light = probes.at(&scene, block.warp.point(point)).expect("inside");
+                    let light = probes
+                        .at(&scene.level, block.warp.point(point))
+                        .expect("inside");
                     f64::from(irradiance_from_probe(&light, normal).x)
                 };
                 (0..n * n).map(light).sum::<f64>() / (n * n) as f64
@@ -83,8 +88,11 @@ fn probes_next_to_a_wall_give_its_irradiance() {
             // The two layers next to the wall, carried on to it.
             let by_probes = 1.5 * layer(0.5) - 0.5 * layer(1.5);
             let first = block.shape.wall_offset(wall, 8).expect("a wall");
-            let texels = (first..first + 64).map(|k| frame.indirect_at(&scene, index, k)[0]);
-            let on_wall = texels.map(f64::from).sum::<f64>() / 64.0;
+            let texels = (first..first + 64).map(|k| frame.indirect_at(BlockIndex::new(index), k));
+            let on_wall = texels
+                .map(|light| f64::from(light.expect("a texel").x))
+                .sum::<f64>()
+                / 64.0;
             let error = (by_probes / on_wall - 1.0).abs();
             println!("block {index} {wall}: {by_probes:.4} against {on_wall:.4}");
             worst = worst.max(error);
@@ -101,10 +109,10 @@ fn light_does_not_jump_where_blocks_join() {
     for k in 0..20 {
         let y = 0.05 + 0.045 * f64::from(k);
         let before = probes
-            .at(&scene, DVec3::new(1.0 - 1e-7, y, 0.4))
+            .at(&scene.level, DVec3::new(1.0 - 1e-7, y, 0.4))
             .expect("inside");
         let after = probes
-            .at(&scene, DVec3::new(1.0 + 1e-7, y, 0.4))
+            .at(&scene.level, DVec3::new(1.0 + 1e-7, y, 0.4))
             .expect("inside");
         for (a, b) in before.iter().flatten().zip(after.iter().flatten()) {
             // Positions are f64 and weights f32.
@@ -142,11 +150,11 @@ fn turning_a_level_turns_its_probes() {
         let moved = turn.direction(cell) + turn.point(point - cell);
         let a = frames[0]
             .probes()
-            .and_then(|p| p.at(&here, point))
+            .and_then(|p| p.at(&here.level, point))
             .expect("inside");
         let b = frames[1]
             .probes()
-            .and_then(|p| p.at(&there, moved))
+            .and_then(|p| p.at(&there.level, moved))
             .expect("inside");
         let mut expected: Vec<f64> = a.iter().map(|rgb| f64::from(rgb[0])).collect();
         sh::rotate(&bands, &mut expected);
@@ -183,11 +191,11 @@ fn two_bands_are_the_first_of_three_and_halves_keep_them() {
 fn an_unconnected_block_has_dark_probes() {
     let mut level = Level::from_cells(&[[0, 0, 0], [2, 0, 0]], Vec3::splat(0.6)).expect("cells");
     level.connections.clear();
-    let scene = assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
+    let scene = Scene::assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
     let frame = lit(&scene, vec3(0.5, 0.6, 0.4), ProbeOrder::L2);
     let probes = frame.probes().expect("asked for");
     let half = probes.values().len() / 2;
     assert!(probes.values()[..half].iter().any(|rgb| rgb[0] > 0.0));
     assert!(probes.values()[half..].iter().flatten().all(|&x| x == 0.0));
-    assert!(scene.blocks[0].shape.opening(Face::PosX).is_none());
+    assert!(scene.level.blocks[0].shape.opening(Face::PosX).is_none());
 }

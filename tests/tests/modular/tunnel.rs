@@ -8,14 +8,14 @@ use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irr
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::{Block, Connection, Level, Opening};
-use mrt_runtime::level::shape::{Shape, shape_set};
-use mrt_runtime::light::placed::{Light, LightError};
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::blocks::{Block, Connection, Opening, Shape};
+use mrt_runtime::low_level::level::shape::shape_set;
+use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Level, Light, LightError, Scene};
+use mrt_tests::FrameForTests;
+use mrt_tests::normal_of;
+use mrt_tests::position_of;
 use std::sync::OnceLock;
 
 const ALBEDO: f32 = 0.6;
@@ -95,8 +95,9 @@ fn placed(shapes: &[&'static Shape], open: [Face; 2]) -> (&'static Shape, CubeRo
         .chain(CubeRotation::all())
         .find_map(|rotation| {
             shapes.iter().find_map(|&shape| {
-                let fits =
-                    |o: &mrt_runtime::level::shape::Aperture| open.contains(&rotation.face(o.face));
+                let fits = |o: &mrt_runtime::low_level::level::shape::Aperture| {
+                    open.contains(&rotation.face(o.face))
+                };
                 shape.openings.iter().all(fits).then_some((shape, rotation))
             })
         })
@@ -108,7 +109,7 @@ fn assembled(level: &Level, dictionary: &Dictionary) -> Scene {
         max_depth: 10,
         ..AssembleConfig::default()
     };
-    assemble(level, dictionary, &config).expect("a level of tubes")
+    Scene::assemble(level, dictionary, &config).expect("a level of tubes")
 }
 
 fn lamp(position: DVec3) -> Light {
@@ -126,30 +127,29 @@ fn middle(cell: [i32; 3]) -> DVec3 {
 /// One channel of indirect irradiance, texel by texel.
 fn indirect(scene: &Scene, frame: &Frame) -> Vec<f64> {
     let mut values = Vec::with_capacity(scene.texel_count());
-    for (index, block) in scene.blocks.iter().enumerate() {
-        let of_texel = |k| f64::from(frame.indirect_at(scene, index, k)[0]);
+    for (index, block) in scene.level.blocks.iter().enumerate() {
+        let light = |k| frame.indirect_at(BlockIndex::new(index), k);
+        let of_texel = |k| f64::from(light(k).expect("a texel").x);
         values.extend((0..block.texels.len()).map(of_texel));
     }
     values
 }
 
 fn lit(scene: &Scene, lights: &[Light], bounces: Bounces) -> Vec<f64> {
-    let mut frame = Frame::new(scene);
-    frame
-        .solve(scene, lights, &Openings, bounces)
-        .expect("legal lights");
+    let mut frame = Frame::new(scene, FrameConfig::default());
+    frame.light_with(lights, bounces);
     indirect(scene, &frame)
 }
 
 /// Area of each texel, in square metres of unit blocks.
 fn areas(scene: &Scene) -> Vec<f64> {
     let mut areas = Vec::with_capacity(scene.texel_count());
-    for block in &scene.blocks {
+    for block in &scene.level.blocks {
         let form = block.shape.tube().expect("a tube");
         for face in block.shape.walls() {
-            for j in 0..scene.resolution {
-                let area = form.texel_area(face, scene.resolution, j);
-                areas.extend(std::iter::repeat_n(area, scene.resolution));
+            for j in 0..scene.level.resolution {
+                let area = form.texel_area(face, scene.level.resolution, j);
+                areas.extend(std::iter::repeat_n(area, scene.level.resolution));
             }
         }
     }
@@ -164,7 +164,7 @@ const LIFT: f64 = 2e-4;
 
 fn mesh(scene: &Scene) -> TriangleMesh {
     let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for block in &scene.blocks {
+    for block in &scene.level.blocks {
         for face in block.shape.walls() {
             let start = positions.len() as u32;
             let row = FACETS as u32 + 1;
@@ -201,8 +201,8 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
     let receivers: Vec<(DVec3, DVec3)> = (0..scene.texel_count())
         .map(|k| {
             (
-                scene.texel_position(k).as_dvec3(),
-                scene.texel_normal(k).as_dvec3(),
+                position_of(scene, k).as_dvec3(),
+                normal_of(scene, k).as_dvec3(),
             )
         })
         .map(|(p, n)| (p + n * LIFT, n))
@@ -244,7 +244,7 @@ fn worst_error(dictionary: &Dictionary, cells: &[[i32; 3]], paths: u32) -> f64 {
         let light = middle(cells[source]) + DVec3::new(0.05, 0.1, -0.08);
         let found = lit(&scene, &[lamp(light)], Bounces::Count(1));
         let reference = traced(&scene, light, paths);
-        for (block, placed) in scene.blocks.iter().enumerate() {
+        for (block, placed) in scene.level.blocks.iter().enumerate() {
             let error = error(&found, &reference, &areas, placed.texels.clone());
             let mean = |e: &[f64]| {
                 let sum: f64 = placed.texels.clone().map(|k| e[k] * areas[k]).sum();
@@ -294,10 +294,10 @@ fn image_error(level: &Level, image: &Level, map: impl Fn(DVec3) -> DVec3) -> f6
     let found = lit(&here, &[lamp(light)], Bounces::Count(2));
     let mapped = lit(&there, &[lamp(map(light))], Bounces::Count(2));
     let (mut miss, mut norm) = (0.0, 0.0);
-    for (block, other) in here.blocks.iter().zip(&there.blocks) {
+    for (block, other) in here.level.blocks.iter().zip(&there.level.blocks) {
         for texel in block.texels.clone() {
-            let place = map(here.texel_position(texel).as_dvec3());
-            let distance = |k: &usize| there.texel_position(*k).as_dvec3().distance(place);
+            let place = map(position_of(&here, texel).as_dvec3());
+            let distance = |k: &usize| position_of(&there, *k).as_dvec3().distance(place);
             let twin = other
                 .texels
                 .clone()
@@ -337,13 +337,11 @@ fn bends_up_and_down_are_bends_to_the_side() {
 fn a_white_furnace_stays_white_in_a_long_tunnel() {
     let cells: [[i32; 3]; 9] = std::array::from_fn(|x| [x as i32, 0, 0]);
     let scene = assembled(&tunnel(&cells), small_dictionary());
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let direct = vec![1.0; 3 * scene.texel_count()];
-    frame
-        .solve_from_direct(&scene, &direct, Bounces::Count(1))
-        .expect("one value a texel");
+    frame.light_from(&direct, Bounces::Count(1));
     let found = indirect(&scene, &frame);
-    for texel in scene.blocks[4].texels.clone() {
+    for texel in scene.level.blocks[4].texels.clone() {
         // Of the light at the middle, 0.1 % comes in through the ends, 4 widths and more away; the rest is
         // the bases' error at their borders.
         assert!(
@@ -362,15 +360,13 @@ fn energy_never_grows() {
     }
     let scene = assembled(&level, small_dictionary());
     let areas = areas(&scene);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let flux = |e: &[f64]| e.iter().zip(&areas).map(|(e, a)| e * a).sum::<f64>();
     let lights = [lamp(middle(TUNNEL[4]))];
     let mut before = 0.0;
     let mut added = f64::INFINITY;
     for passes in 1..40 {
-        frame
-            .solve(&scene, &lights, &Openings, Bounces::Count(passes))
-            .expect("a legal light");
+        frame.light_with(&lights, Bounces::Count(passes));
         let now = flux(&indirect(&scene, &frame));
         // Each bounce brings less than the one before, up to what f32 leaves of the sum.
         assert!(now - before <= added + 1e-5 * now, "{passes}");
@@ -389,18 +385,16 @@ fn joined_tubes_have_no_seam() {
 /// rims, over the mean of the level.
 fn seam(dictionary: &Dictionary) -> f64 {
     let scene = assembled(&tunnel(&TUNNEL), dictionary);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let lights = [lamp(middle(TUNNEL[4]) + DVec3::new(0.1, 0.05, 0.1))];
-    frame
-        .solve(&scene, &lights, &Openings, Bounces::Count(2))
-        .expect("a legal light");
+    frame.light_with(&lights, Bounces::Count(2));
     let found = indirect(&scene, &frame);
     let mean = found.iter().sum::<f64>() / found.len() as f64;
-    let resolution = scene.resolution;
+    let resolution = scene.level.resolution;
     // The two texels nearest to an opening in each row, nearest first, with their places.
     let rows = |block: usize, side: Face| -> Vec<(DVec3, [usize; 2])> {
-        let placed = &scene.blocks[block];
-        let point = |k: usize| scene.texel_position(placed.texels.start + k).as_dvec3();
+        let placed = &scene.level.blocks[block];
+        let point = |k: usize| position_of(&scene, placed.texels.start + k).as_dvec3();
         let plane = placed.warp.point(side.point(0.5, 0.5));
         let out = (plane - placed.warp.center()).normalize();
         let depth = |k: usize| (plane - point(k)).dot(out);
@@ -419,7 +413,7 @@ fn seam(dictionary: &Dictionary) -> f64 {
     let (mut squares, mut count) = (0.0, 0);
     for connection in &tunnel(&TUNNEL).connections {
         let canonical = |end: &Opening| {
-            let placed = &scene.blocks[end.block];
+            let placed = &scene.level.blocks[end.block];
             rows(end.block, placed.orientation.inverse().face(end.face))
         };
         let (ours, theirs) = (canonical(&connection.a), canonical(&connection.b));
@@ -442,29 +436,24 @@ fn seam(dictionary: &Dictionary) -> f64 {
 #[test]
 fn borders_of_the_lightmap_go_on_around_and_along_the_tunnel() {
     let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
-    let mut frame = Frame::new(&scene);
-    frame
-        .solve(
-            &scene,
-            &[lamp(middle(TUNNEL[2]))],
-            &Openings,
-            Bounces::Count(1),
-        )
-        .expect("a legal light");
+    let mut frame = Frame::new(&scene, FrameConfig::default());
+    frame.light_with(&[lamp(middle(TUNNEL[2]))], Bounces::Count(1));
     // All places on the rims of charts, with what the lightmap says there.
     let mut rims: Vec<(DVec3, [f32; 3], [usize; 2])> = Vec::new();
-    for (index, block) in scene.blocks.iter().enumerate() {
+    for (index, block) in scene.level.blocks.iter().enumerate() {
         for face in block.shape.walls() {
-            for k in 0..scene.resolution {
-                let along = (k as f64 + 0.5) / scene.resolution as f64;
+            for k in 0..scene.level.resolution {
+                let along = (k as f64 + 0.5) / scene.level.resolution as f64;
                 for (u, v) in [(0.0, along), (1.0, along), (along, 0.0), (along, 1.0)] {
                     let place = block
                         .warp
                         .point(block.shape.wall_point(face, u, v).position);
-                    let pixel = scene.atlas.pixel(index, face, u as f32, v as f32);
+                    let pixel = scene
+                        .atlas
+                        .pixel(BlockIndex::new(index), face, u as f32, v as f32);
                     let light = scene
                         .atlas
-                        .sample(frame.lightmap(), pixel.expect("a chart"));
+                        .sample(frame.lightmap().pixels(), pixel.expect("a chart"));
                     rims.push((place, light, [index, face.index()]));
                 }
             }
@@ -486,7 +475,7 @@ fn borders_of_the_lightmap_go_on_around_and_along_the_tunnel() {
         }
     }
     // Four rims along each of ten tubes, and nine discs of four charts.
-    assert_eq!(pairs, (10 * 4 + 9 * 4) * scene.resolution);
+    assert_eq!(pairs, (10 * 4 + 9 * 4) * scene.level.resolution);
 }
 
 #[test]
@@ -495,27 +484,28 @@ fn an_unconnected_tube_reads_zero() {
     level.connections.pop();
     let scene = assembled(&level, small_dictionary());
     let found = lit(&scene, &[lamp(middle(TUNNEL[0]))], Bounces::Count(4));
-    let texels = &scene.blocks[3].texels;
+    let texels = &scene.level.blocks[3].texels;
     assert!(found[texels.clone()].iter().all(|&e| e == 0.0));
     assert!(
-        found[scene.blocks[2].texels.clone()]
+        found[scene.level.blocks[2].texels.clone()]
             .iter()
             .any(|&e| e > 0.0)
     );
 }
 
 #[test]
-fn a_light_outside_the_round_wall_is_refused() {
+fn a_light_outside_the_round_wall_is_skipped() {
     let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let corner = lamp(DVec3::new(1.5, 0.05, 0.05));
-    let refused = frame.solve(&scene, &[corner], &Openings, Bounces::Count(1));
+    frame.add_light(corner);
+    let report = frame.solve();
     let expected = LightError::OutsideTube {
-        light: 0,
-        block: 1,
+        block: BlockIndex::new(1),
         found: Vec3::new(1.5, 0.05, 0.05),
     };
-    assert_eq!(refused, Err(expected.into()));
+    let reasons = report.skipped_lights().iter().map(|light| light.reason);
+    assert_eq!(reasons.collect::<Vec<_>>(), [expected]);
 }
 
 #[test]

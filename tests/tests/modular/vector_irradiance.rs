@@ -7,13 +7,10 @@ use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon}
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, Outputs};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Level, Light, Outputs, Scene};
+use mrt_tests::FrameForTests;
 use std::sync::OnceLock;
 
 const RESOLUTION: usize = 8;
@@ -61,7 +58,7 @@ fn integrated(
     point: DVec3,
     normal: DVec3,
 ) -> f64 {
-    let placed = &scene.blocks[block];
+    let placed = &scene.level.blocks[block];
     let count = placed.texels.len();
     let half = 0.5 / RESOLUTION as f64;
     let horizon = HalfSpace::through(point, normal);
@@ -86,24 +83,28 @@ fn integrated(
 /// Relative L2 error over all texels of a closed room and some of the normals.
 fn errors(position: Vec3, tilt: std::ops::Range<usize>) -> f64 {
     let level = Level::from_cells(&[[0, 0, 0]], Vec3::ONE).expect("a cell");
-    let scene = assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
+    let scene = Scene::assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
     let outputs = Outputs {
         lightmap: true,
         probes: None,
         vector: true,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let mut frame = Frame::new(
+        &scene,
+        FrameConfig {
+            outputs,
+            ..FrameConfig::default()
+        },
+    );
     let lamp = Light::Sphere {
         position,
         radius: 0.05,
         intensity: Vec3::ONE,
     };
-    frame
-        .solve(&scene, &[lamp], &Openings, Bounces::Count(1))
-        .expect("a light");
+    frame.light_with(&[lamp], Bounces::Count(1));
     let normals = &normals()[tilt];
     let (mut miss, mut size) = (0.0, 0.0);
-    for (k, (face, point)) in scene.blocks[0].shape.texels(RESOLUTION).enumerate() {
+    for (k, (face, point)) in scene.level.blocks[0].shape.texels(RESOLUTION).enumerate() {
         let axes = [
             DVec3::AXES[face.u_axis()],
             DVec3::AXES[face.v_axis()],
@@ -113,7 +114,12 @@ fn errors(position: Vec3, tilt: std::ops::Range<usize>) -> f64 {
             let n = normal.as_dvec3();
             let world = axes[0] * n.x + axes[1] * n.y + axes[2] * n.z;
             let exact = integrated(&scene, &frame, 0, face, point, world);
-            let ours = f64::from(frame.vector_at(&scene, 0, k, normal)[0]);
+            let ours = f64::from(
+                frame
+                    .vector_at(BlockIndex::new(0), k, normal)
+                    .expect("asked for")
+                    .x,
+            );
             miss += (ours - exact) * (ours - exact);
             size += exact * exact;
         }
@@ -154,26 +160,36 @@ fn vector_irradiance_crosses_openings_and_follows_the_wall() {
     // Upright normals see the lightmap's irradiance in every block, whatever way its light came.
     let cells = [[0, 0, 0], [1, 0, 0], [1, 0, 1], [2, 0, 1]];
     let level = Level::from_cells(&cells, Vec3::ONE).expect("cells");
-    let scene = assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
+    let scene = Scene::assemble(&level, dictionary(), &AssembleConfig::default()).expect("a level");
     let outputs = Outputs {
         lightmap: true,
         probes: None,
         vector: true,
     };
-    let mut frame = Frame::with_outputs(&scene, outputs);
+    let mut frame = Frame::new(
+        &scene,
+        FrameConfig {
+            outputs,
+            ..FrameConfig::default()
+        },
+    );
     let lamp = Light::Sphere {
         position: vec3(0.4, 0.5, 0.6),
         radius: 0.05,
         intensity: Vec3::ONE,
     };
-    frame
-        .solve(&scene, &[lamp], &Openings, Bounces::Count(1))
-        .expect("a light");
-    for (index, block) in scene.blocks.iter().enumerate() {
+    frame.light_with(&[lamp], Bounces::Count(1));
+    for (index, block) in scene.level.blocks.iter().enumerate() {
+        let block_index = BlockIndex::new(index);
         let (mut miss, mut size) = (0.0, 0.0);
         for k in 0..block.texels.len() {
-            let exact = f64::from(frame.indirect_at(&scene, index, k)[0]);
-            let ours = f64::from(frame.vector_at(&scene, index, k, Vec3::Z)[0]);
+            let exact = f64::from(frame.indirect_at(block_index, k).expect("a texel").x);
+            let ours = f64::from(
+                frame
+                    .vector_at(block_index, k, Vec3::Z)
+                    .expect("asked for")
+                    .x,
+            );
             miss += (ours - exact) * (ours - exact);
             size += exact * exact;
         }

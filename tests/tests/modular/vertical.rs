@@ -7,11 +7,10 @@ use mrt_core::reference::oracle_file::{oracle_folder_or_report, read};
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::modular::assemble::{AssembleConfig, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::Bounces;
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Level, Scene};
+use mrt_tests::FrameForTests;
+use mrt_tests::normal_of;
+use mrt_tests::position_of;
 use mrt_tests::{Random, by_texel, largest_difference, solved, sphere};
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -36,7 +35,7 @@ fn assembled(level: &Level, coupling: Coupling) -> Scene {
         transport_storage: mrt_core::storage::Storage::F32,
         ..AssembleConfig::default()
     };
-    assemble(level, mobile(), &config).expect("the level fits the dictionary")
+    Scene::assemble(level, mobile(), &config).expect("the level fits the dictionary")
 }
 
 /// A bend upwards and sideways, a loop that stands, and a heap.
@@ -83,9 +82,9 @@ fn by_place(scene: &Scene, signal: &[[f32; 3]], turn: CubeRotation) -> HashMap<[
     (0..scene.texel_count())
         .map(|texel| {
             let middle = DVec3::splat(0.5);
-            let position = scene.texel_position(texel).as_dvec3() - middle;
+            let position = position_of(scene, texel).as_dvec3() - middle;
             let [a, b, c] = whole(turn.direction(position));
-            let [d, e, f] = whole(turn.direction(scene.texel_normal(texel).as_dvec3()));
+            let [d, e, f] = whole(turn.direction(normal_of(scene, texel).as_dvec3()));
             ([a, b, c, d, e, f], signal[texel])
         })
         .collect()
@@ -154,7 +153,7 @@ fn a_stack_is_within_the_bounds_of_the_standard_preset() {
         max_depth: 3,
         ..AssembleConfig::default()
     };
-    let scene = assemble(&level, &dictionary, &assemble_config).expect("it fits");
+    let scene = Scene::assemble(&level, &dictionary, &assemble_config).expect("it fits");
     let mut whole = 0.0;
     for (light, position) in reference.lights.iter().enumerate() {
         let source = sphere(

@@ -1,11 +1,10 @@
 //! Many bounces between nearly white walls: they converge, from below, to what energy allows.
 
 use glam::Vec3;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::frame::{Bounces, Frame, MAX_PASSES};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::modular::frame::config::MAX_PASSES;
+use mrt_runtime::{Bounces, Frame, Level, Light, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::{
     Random, assembled, by_texel, closed_floor_plans, floor_plan, random_cells, solved, sphere,
 };
@@ -61,14 +60,21 @@ fn bounces_between_nearly_white_walls_converge_below_the_bound_of_energy() {
             limit: MAX_PASSES,
         };
         let frame = solved(&scene, &[lamp()], bounces);
-        assert!(frame.passes() < MAX_PASSES, "{name}: {}", frame.passes());
+        assert!(
+            frame.last_report().passes() < MAX_PASSES,
+            "{name}: {}",
+            frame.last_report().passes()
+        );
         let mut share = 0.0f64;
         for channel in 0..3 {
             let sent = flux(&scene, &frame.direct(), channel) * albedo;
             let bound = sent * (1.0 + SPOT_GAIN) / (1.0 - albedo);
             share = share.max(flux(&scene, &frame.indirect(), channel) / bound);
         }
-        println!("{name}: {} passes, {share:.4} of the bound", frame.passes());
+        println!(
+            "{name}: {} passes, {share:.4} of the bound",
+            frame.last_report().passes()
+        );
         assert!(share <= 1.0 + FLUX_ROUNDING, "{name}: {share}");
     }
 }
@@ -77,13 +83,11 @@ fn bounces_between_nearly_white_walls_converge_below_the_bound_of_energy() {
 fn every_bounce_adds_light_and_never_more_than_the_one_before() {
     for (name, level) in levels() {
         let scene = assembled(&level);
-        let mut frame = Frame::new(&scene);
+        let mut frame = Frame::new(&scene, FrameConfig::default());
         let (mut before, mut last) = (0.0, f64::MAX);
         for pass in 0..40 {
             // A pass on the light of the frame before: the next of the iterates that `Converged` goes through.
-            frame
-                .solve(&scene, &[lamp()], &Openings, Bounces::Feedback)
-                .expect("a sound light");
+            frame.light_with(&[lamp()], Bounces::Feedback);
             let now = flux(&scene, &frame.indirect(), 0);
             let added = now - before;
             let rounding = FLUX_ROUNDING * now;
@@ -114,7 +118,7 @@ fn walls_that_lose_nothing_gain_nothing_either() {
             for channel in 0..3 {
                 // No bounce brings more than the direct light.
                 let direct = flux(&scene, &frame.direct(), channel) * (1.0 + SPOT_GAIN);
-                let bound = f64::from(frame.passes()) * direct;
+                let bound = f64::from(frame.last_report().passes()) * direct;
                 let found = flux(&scene, &frame.indirect(), channel);
                 println!(
                     "{} cells, {name}, channel {channel}: {:.4}",

@@ -4,8 +4,9 @@ use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::radiosity::transport::Transport;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::FrameConfig;
+use mrt_runtime::{Bounces, Frame, Level};
+use mrt_tests::FrameForTests;
 use mrt_tests::{
     CONVERGED, assembled, by_texel, corridor, exact_of, floor_plan, in_level_order,
     largest_difference, solved,
@@ -31,7 +32,7 @@ fn a_panel_lights_its_own_block_and_the_others() {
     let frame = solved(&scene, &[], Bounces::Count(1));
     assert!(frame.direct().iter().all(|&e| e == 0.0));
     let light = by_texel(&scene, &frame.indirect());
-    for (index, block) in scene.blocks.iter().enumerate() {
+    for (index, block) in scene.level.blocks.iter().enumerate() {
         let sum: f32 = light[block.texels.clone()].iter().map(|e| e[0]).sum();
         assert!(sum > 0.0, "block {index}");
     }
@@ -45,22 +46,20 @@ fn a_panel_is_the_direct_light_that_its_wall_would_reflect() {
     dark.blocks[0].emission = [Vec3::ZERO; 6];
     let dark = assembled(&dark);
     let mut direct = vec![0.0; 3 * dark.texel_count()];
-    let block = &dark.blocks[0];
+    let block = &dark.level.blocks[0];
     let ceiling = block
         .shape
-        .wall_offset(Face::PosY, dark.resolution)
+        .wall_offset(Face::PosY, dark.level.resolution)
         .expect("there is a ceiling");
     for channel in 0..3 {
         let start = 3 * block.texels.start + channel * block.texels.len() + ceiling;
-        let texels = dark.resolution * dark.resolution;
+        let texels = dark.level.resolution * dark.level.resolution;
         direct[start..start + texels].fill(PANEL[channel] / albedo);
     }
     for bounces in [Bounces::Count(1), Bounces::Count(7), CONVERGED] {
         let expected = {
-            let mut frame = Frame::new(&dark);
-            frame
-                .solve_from_direct(&dark, &direct, bounces)
-                .expect("light of the right length");
+            let mut frame = Frame::new(&dark, FrameConfig::default());
+            frame.light_from(&direct, bounces);
             by_texel(&dark, &frame.indirect())
         };
         let found = solved(&shining, &[], bounces);
@@ -76,20 +75,20 @@ fn a_panel_shines_as_exact_form_factors_say() {
     let scene = assembled(&level);
     let frame = solved(&scene, &[], CONVERGED);
     let found = in_level_order(&level, &scene, &frame.indirect());
-    let exact = exact_of(&level, scene.resolution);
+    let exact = exact_of(&level, scene.level.resolution);
     let transport = Transport::build(&exact);
     let radiosity: Vec<[f64; 4]> = exact
         .walls()
         .iter()
         .flat_map(|wall| {
             let emission = level.blocks[wall.block].emission[wall.face.index()];
-            vec![[f64::from(emission.x); 4]; scene.resolution * scene.resolution]
+            vec![[f64::from(emission.x); 4]; scene.level.resolution * scene.level.resolution]
         })
         .collect();
     let expected = transport
         .irradiance(&radiosity)
         .expect("of the right length");
-    let texels = scene.resolution * scene.resolution;
+    let texels = scene.level.resolution * scene.level.resolution;
     for (block, bound) in PANEL_ERROR.into_iter().enumerate() {
         let of_block = |values: Vec<f64>| -> Vec<f64> {
             exact

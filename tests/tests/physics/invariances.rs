@@ -3,11 +3,10 @@
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::frame::Bounces;
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::{AssembleConfig, Bounces, Level, Light, Scene};
+use mrt_tests::FrameForTests;
+use mrt_tests::normal_of;
+use mrt_tests::position_of;
 use mrt_tests::{
     CONVERGED, Random, by_texel, corridor, default_dictionary, floor_plan, largest_difference,
     solved, sphere,
@@ -69,7 +68,7 @@ fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f
         negligible: Some(0.0),
         ..AssembleConfig::default()
     };
-    let scene = assemble(level, default_dictionary(), &config).expect("it fits");
+    let scene = Scene::assemble(level, default_dictionary(), &config).expect("it fits");
     let frame = solved(&scene, lights, bounces);
     let signal = by_texel(&scene, &frame.indirect());
     (scene, signal)
@@ -77,8 +76,8 @@ fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f
 
 /// Place and direction of a texel as whole numbers: texel centres are multiples of 1/32 at 16².
 fn place(scene: &Scene, texel: usize, map: impl Fn(Vec3) -> Vec3) -> [i32; 6] {
-    let position = map(scene.texel_position(texel)) * 64.0;
-    let normal = map(scene.texel_normal(texel)) - map(Vec3::ZERO);
+    let position = map(position_of(scene, texel)) * 64.0;
+    let normal = map(normal_of(scene, texel)) - map(Vec3::ZERO);
     let whole = |v: Vec3| v.round().as_ivec3().to_array();
     let ([a, b, c], [d, e, f]) = (whole(position), whole(normal));
     [a, b, c, d, e, f]
@@ -325,7 +324,7 @@ fn a_mirrored_corridor_has_mirrored_light() {
     let (scene, left) = indirect(&level, &at(1.25), CONVERGED);
     let (other, right) = indirect(&level, &at(4.75), CONVERGED);
     let by_place = |scene: &Scene, texel: usize, mirror: bool| {
-        let (mut p, mut n) = (scene.texel_position(texel), scene.texel_normal(texel));
+        let (mut p, mut n) = (position_of(scene, texel), normal_of(scene, texel));
         if mirror {
             (p.x, n.x) = (6.0 - p.x, -n.x);
         }

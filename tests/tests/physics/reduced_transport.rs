@@ -9,11 +9,11 @@ use mrt_dictionary::modular::one_bounce::cube::{
 use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::shape::cubes;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::dictionary::ShapeOperators;
-use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::FrameConfig;
+use mrt_runtime::low_level::level::shape::cubes;
+use mrt_runtime::low_level::modular::dictionary::ShapeOperators;
+use mrt_runtime::{Bounces, Frame, Level};
+use mrt_tests::FrameForTests;
 use mrt_tests::{
     CONVERGED, Random, assembled, by_texel, closed_floor_plans, corridor, default_dictionary,
     floor_plan, in_level_order, largest_difference, solved, sphere,
@@ -32,11 +32,9 @@ fn deviation_from_one(irradiance: &[f32]) -> (f64, f64) {
 /// One bounce of uniform direct light 1 from white walls.
 fn furnace(level: &Level) -> Frame {
     let scene = assembled(level);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let direct = vec![1.0; 3 * scene.texel_count()];
-    frame
-        .solve_from_direct(&scene, &direct, Bounces::Count(1))
-        .expect("light of the right length");
+    frame.light_from(&direct, Bounces::Count(1));
     frame
 }
 
@@ -78,12 +76,10 @@ const FURNACE_MEAN: f64 = 0.003;
 fn a_furnace_keeps_its_level_over_all_bounces() {
     for (name, cells) in closed_floor_plans() {
         let scene = assembled(&floor_plan(&cells, 0.5));
-        let mut frame = Frame::new(&scene);
+        let mut frame = Frame::new(&scene, FrameConfig::default());
         // E = a (1 + E) has the solution 1 at a = 1/2.
         let direct = vec![1.0; 3 * scene.texel_count()];
-        frame
-            .solve_from_direct(&scene, &direct, CONVERGED)
-            .expect("light of the right length");
+        frame.light_from(&direct, CONVERGED);
         let (worst, mean) = deviation_from_one(&frame.indirect());
         println!(
             "all bounces, {name}: worst {:.2} %, mean {:+.3} %",
@@ -225,7 +221,7 @@ fn an_unconnected_block_reads_exactly_zero() {
             by_texel(&scene, &frame.direct()),
             by_texel(&scene, &frame.indirect()),
         );
-        for (index, block) in scene.blocks.iter().enumerate() {
+        for (index, block) in scene.level.blocks.iter().enumerate() {
             for texel in block.texels.clone() {
                 if index >= 2 {
                     assert_eq!(direct[texel], [0.0; 3], "block {index}");
@@ -244,13 +240,11 @@ fn feedback_over_frames_tends_to_all_bounces() {
     let scene = assembled(&level);
     let light = sphere(Vec3::new(0.4, 0.6, 0.5), 0.1, Vec3::new(1.0, 2.0, 3.0));
     let converged = solved(&scene, &[light], CONVERGED);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let mut before = f64::MAX;
     for round in 0..10 {
         for _ in 0..10 {
-            frame
-                .solve(&scene, &[light], &Openings, Bounces::Feedback)
-                .expect("the light is sound");
+            frame.light_with(&[light], Bounces::Feedback);
         }
         let apart = largest_difference(
             &in_level_order(&level, &scene, &frame.indirect()),

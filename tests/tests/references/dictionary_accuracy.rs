@@ -15,12 +15,11 @@ use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_boun
 use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, Coupling, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces as Passes, Frame};
-use mrt_runtime::modular::scene::Scene;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::{
+    AssembleConfig, AssembleError, Bounces as Passes, Coupling, Dictionary, Frame, Level, Scene,
+};
 use mrt_tests::{CONVERGED, default_dictionary, solved, sphere};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -77,7 +76,8 @@ fn solve_all(
         coupling,
         ..AssembleConfig::default()
     };
-    let scene = assemble(&level, dictionary, &config).expect("the level fits the dictionary");
+    let scene =
+        Scene::assemble(&level, dictionary, &config).expect("the level fits the dictionary");
     let coloured = matches!(reference.kind, Kind::IrradianceRgb { .. });
     let passes = match bounces {
         Bounces::First => Passes::Count(1),
@@ -113,16 +113,21 @@ fn at_reference_texels(reference: &ReferenceFile, scene: &Scene, frame: &Frame) 
     let resolution = reference.resolution.expect("surfaces, no probes");
     let mut out = Vec::new();
     for &(block, face) in &reference.walls {
-        let canonical = scene.blocks[block].orientation.inverse();
+        let canonical = scene.level.blocks[block].orientation.inverse();
         let wall = canonical.face(face);
         for texel in 0..resolution * resolution {
             let center = face.texel_center(resolution, texel / resolution, texel % resolution);
             let point = canonical.point(center).as_vec3();
             let pixel = scene
                 .atlas
-                .pixel(block, wall, point[wall.u_axis()], point[wall.v_axis()])
+                .pixel(
+                    BlockIndex::new(block),
+                    wall,
+                    point[wall.u_axis()],
+                    point[wall.v_axis()],
+                )
                 .expect("walls of the reference are walls of the level");
-            out.push(scene.atlas.sample(frame.lightmap(), pixel));
+            out.push(scene.atlas.sample(frame.lightmap().pixels(), pixel));
         }
     }
     out
@@ -386,7 +391,7 @@ fn a_stack_of_blocks_is_refused_by_name() {
         return;
     };
     let stack = reference(&folder, "stack3");
-    let error = assemble(
+    let error = Scene::assemble(
         &level(&stack, 1.0),
         default_dictionary(),
         &AssembleConfig::default(),

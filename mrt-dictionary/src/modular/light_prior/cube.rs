@@ -2,14 +2,14 @@
 //! its enrichment (appendix A).
 
 use crate::config::{Enrichment, PriorConfig};
-use crate::modular::transport::modes::whole_multiplets;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::svd;
-use mrt_runtime::level::shape::Shape;
+use mrt_core::linalg::parity_modes::ModeChoice;
+use mrt_core::linalg::svd::{Svd, svd};
+use mrt_runtime::blocks::Shape;
 
 /// Columns `P S` (basis vectors of direct irradiance times their singular values), in the coordinates
 /// of each parity class of the texels.
@@ -168,33 +168,19 @@ pub(crate) fn root_sum_of_squares(norms: impl Iterator<Item = f64>) -> f64 {
 /// Left singular vectors times singular values, class by class, keeping at most the `keep` largest overall:
 /// whole multiplets that are not lost in rounding.
 fn decompose(folded: &[Matrix<f64>], keep: usize) -> LightPrior {
-    let parts: Vec<_> = folded.iter().map(|m| svd(m.view())).collect();
-    let mut singular_values: Vec<f64> = parts
-        .iter()
-        .flat_map(|part| part.singular_values.iter().copied())
-        .collect();
-    singular_values.sort_by(|a, b| b.total_cmp(a));
-    let kept = whole_multiplets(&singular_values, keep);
-    // Between the last one kept and the first one left out, where rounding cannot reach.
-    let next = singular_values.get(kept).copied().unwrap_or(0.0);
-    let threshold = match kept.checked_sub(1) {
-        Some(last) => 0.5 * (singular_values[last] + next),
-        None => f64::INFINITY,
-    };
+    let parts: Vec<Svd> = folded.iter().map(|m| svd(m.view())).collect();
+    let choice = ModeChoice::largest(parts.iter().map(|part| &part.singular_values[..]), keep);
     let classes = parts
         .iter()
-        .map(|part| {
-            let count = part
-                .singular_values
-                .iter()
-                .filter(|&&s| s >= threshold)
-                .count();
+        .enumerate()
+        .map(|(class, part)| {
+            let count = choice.count_of_class(class);
             let scales = &part.singular_values[..count];
             part.u.leading_columns(count).scaled_columns(scales)
         })
         .collect();
     LightPrior {
         basis: ScaledBasis { classes },
-        singular_values,
+        singular_values: choice.singular_values,
     }
 }

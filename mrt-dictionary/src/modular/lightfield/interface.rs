@@ -12,31 +12,20 @@ use crate::modular::outputs::cube::{
 };
 use crate::modular::paths::response::{ResponseBasis, stack};
 use crate::modular::paths::transport::{EMITTER, RECEIVER};
-use crate::modular::transport::modes::whole_multiplets;
+use crate::parallel_products::parallel_transpose_multiply;
 use crate::progress::{Cancelled, Progress};
 use glam::{DVec2, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::geometry::polygon_moments::polygon_moments;
-use mrt_core::linalg::matrix::{Matrix, dot, transpose_multiply};
+use mrt_core::linalg::matrix::{Matrix, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Hole;
+use mrt_core::linalg::parity_modes::{
+    GramModes, ModeChoice, ParityBasis, ParityMode, combined_columns, gram_of_columns,
+};
+use mrt_runtime::low_level::level::shape::Hole;
 use rayon::prelude::*;
 use std::f64::consts::PI;
-
-/// The reduced lightfield basis `H_rlf`.
-#[derive(Clone, Debug)]
-pub struct LightfieldBasis {
-    /// Orthonormal flux-weighted vectors, samples x modes; each has a parity under both mirrors.
-    pub vectors: Matrix<f64>,
-    /// Singular value of each vector.
-    pub scales: Vec<f64>,
-    /// Parity class of each vector: bit 0 set if odd in u, bit 1 if odd in v.
-    pub classes: Vec<usize>,
-    /// Fraction that the modes left out hold of the lightfields' energy beyond their first mode.
-    pub dropped_energy: f64,
-}
 
 /// Operators of the canonical interface.
 #[derive(Clone, Debug)]
@@ -112,15 +101,8 @@ pub fn lightfield_basis(
     columns: &[Matrix<f64>],
     modes: usize,
     progress: &Progress,
-) -> Result<LightfieldBasis, Cancelled> {
-    /// What a class was decomposed into: its columns, and the weights of them in each mode.
-    struct Part {
-        folded: Vec<Vec<f64>>,
-        weights: Matrix<f64>,
-    }
-    let mut parts = Vec::with_capacity(classes.class_count());
-    // (singular value, class, position in the class) of every mode that rounding leaves standing.
-    let mut found: Vec<(f64, usize, usize)> = Vec::new();
+) -> Result<ParityBasis, Cancelled> {
+    let mut parts: Vec<(Matrix<f64>, GramModes)> = Vec::with_capacity(classes.class_count());
     for class in 0..classes.class_count() {
         progress.check()?;
         let folded: Vec<Vec<f64>> = columns
@@ -128,43 +110,18 @@ pub fn lightfield_basis(
             .flat_map(|part| (0..part.columns()).into_par_iter().map(move |j| (part, j)))
             .map(|(part, j)| classes.fold(class, part.column(j)))
             .collect();
-        let count = folded.len();
-        let lower: Vec<Vec<f64>> = (0..count)
-            .into_par_iter()
-            .map(|j| (j..count).map(|i| dot(&folded[i], &folded[j])).collect())
-            .collect();
-        let gram = Matrix::from_fn(count, count, |i, j| lower[i.min(j)][i.max(j) - i.min(j)]);
-        let (values, weights) = symmetric_eigen(gram.view());
-        let floor = 1e-12 * values.first().copied().unwrap_or(0.0);
-        let standing = values.iter().take_while(|&&v| v > floor && v > 0.0);
-        found.extend(standing.enumerate().map(|(k, v)| (v.sqrt(), class, k)));
-        parts.push(Part { folded, weights });
+        let folded = Matrix::from_columns(classes.dimension(class), &folded);
+        let modes = GramModes::of(&gram_of_columns(&folded));
+        parts.push((folded, modes));
     }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let all: Vec<f64> = found.iter().map(|mode| mode.0).collect();
-    let kept = whole_multiplets(&all, modes);
-    let vectors: Vec<Vec<f64>> = found[..kept]
-        .par_iter()
-        .map(|&(scale, class, k)| {
-            let part = &parts[class];
-            let mut vector = vec![0.0; classes.dimension(class)];
-            for (column, &weight) in part.folded.iter().zip(part.weights.column(k)) {
-                let weight = weight / scale;
-                for (v, &x) in vector.iter_mut().zip(column) {
-                    *v += weight * x;
-                }
-            }
-            let sign = largest_entry_sign(&vector);
-            vector.iter_mut().for_each(|v| *v *= sign);
-            classes.unfold(class, &vector)
-        })
-        .collect();
-    Ok(LightfieldBasis {
-        vectors: Matrix::from_columns(classes.point_count(), &vectors),
-        scales: all[..kept].to_vec(),
-        classes: found[..kept].iter().map(|mode| mode.1).collect(),
-        dropped_energy: dropped_energy_beyond_first(&all, kept),
-    })
+    let values = parts.iter().map(|(_, part)| &part.singular_values[..]);
+    let choice = ModeChoice::largest(values, modes);
+    Ok(choice.basis(classes, |ParityMode { class, position }| {
+        let (folded, part) = &parts[class];
+        let scale = part.singular_values[position];
+        let weights = part.vectors.column(position).iter().map(|w| w / scale);
+        combined_columns(folded, &weights.collect::<Vec<f64>>())
+    }))
 }
 
 /// Which way lightfields leave the cube that they entered at z = 0 heading for +z.
@@ -252,11 +209,11 @@ fn accumulate(by_sample: &Matrix<f64>, taps: &[(usize, f64)], scale: f64, out: &
 pub fn enriched_basis(
     grid: &LightfieldGrid,
     classes: &ParityClasses,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     config: &LightfieldConfig,
     has_exchanges: bool,
     progress: &Progress,
-) -> Result<LightfieldBasis, Cancelled> {
+) -> Result<ParityBasis, Cancelled> {
     let scaled = basis.vectors.scaled_columns(&basis.scales);
     let straight = propagated(grid, &scaled, Exit::Straight);
     progress.check()?;
@@ -293,7 +250,7 @@ fn mirrored_columns(classes: &ParityClasses, columns: &Matrix<f64>) -> Matrix<f6
 /// [`Cancelled`].
 pub fn interface_operators(
     grid: &LightfieldGrid,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     emitted: &Matrix<f64>,
     response: &ResponseBasis,
     setup: &InterfaceSetup,
@@ -370,17 +327,8 @@ fn masked(grid: &LightfieldGrid, fields: &Matrix<f64>, hole: Hole) -> Matrix<f64
 }
 
 /// Coefficients of lightfields (flux-weighted, samples x signals) in the basis.
-pub fn lightfield_coefficients(basis: &LightfieldBasis, fields: &Matrix<f64>) -> Matrix<f64> {
+pub fn lightfield_coefficients(basis: &ParityBasis, fields: &Matrix<f64>) -> Matrix<f64> {
     parallel_transpose_multiply(&basis.vectors, fields)
-}
-
-fn parallel_transpose_multiply(a: &Matrix<f64>, b: &Matrix<f64>) -> Matrix<f64> {
-    let columns: Vec<Matrix<f64>> = (0..b.columns())
-        .into_par_iter()
-        .map(|j| transpose_multiply(a.view(), b.columns_view(j..j + 1)))
-        .collect();
-    let columns: Vec<&[f64]> = columns.iter().map(|m| m.data()).collect();
-    Matrix::from_columns(a.columns(), &columns)
 }
 
 /// Cells along each axis into which the interface is cut to light the walls.
@@ -396,7 +344,7 @@ const NEAR_PARTS: usize = 4;
 /// that the lightfield has from the cell's centre towards the receiver.
 fn response_of_modes(
     grid: &LightfieldGrid,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     resolution: usize,
     probes: usize,
 ) -> Matrix<f64> {

@@ -11,9 +11,7 @@
 use crate::config::LightfieldConfig;
 use crate::modular::light_prior::cube::root_sum_of_squares;
 use crate::modular::lightfield::grid::{LightfieldGrid, Tap, frame_of_heading};
-use crate::modular::lightfield::interface::{
-    LightfieldBasis, lightfield_basis, lightfield_coefficients,
-};
+use crate::modular::lightfield::interface::{lightfield_basis, lightfield_coefficients};
 use crate::modular::one_bounce::tube::tube_texel_at;
 use crate::progress::{Cancelled, Progress};
 use glam::{DVec2, DVec3};
@@ -22,6 +20,7 @@ use mrt_core::geometry::tube::{TUBE_RADIUS, TubeForm};
 use mrt_core::lighting::sampling::{disk_from_square, square_from_disk, square_from_unit};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
+use mrt_core::linalg::parity_modes::ParityBasis;
 use std::f64::consts::PI;
 
 /// Through which openings light enters and leaves a tube.
@@ -178,10 +177,10 @@ pub(crate) fn accumulate(by_sample: &Matrix<f64>, taps: &[Tap], scale: f64, out:
 pub fn tube_enriched_basis(
     grid: &LightfieldGrid,
     classes: &ParityClasses,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     config: &LightfieldConfig,
     progress: &Progress,
-) -> Result<LightfieldBasis, Cancelled> {
+) -> Result<ParityBasis, Cancelled> {
     let scaled = basis.vectors.scaled_columns(&basis.scales);
     let mut sent = Vec::with_capacity(2);
     // What goes right is the mirror image of what goes left and in each parity the same up to its sign, so the one
@@ -223,7 +222,7 @@ pub struct TubeInterface {
 /// [`Cancelled`].
 pub fn tube_interface(
     grid: &LightfieldGrid,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     progress: &Progress,
 ) -> Result<TubeInterface, Cancelled> {
     let through = |passage| {
@@ -235,7 +234,7 @@ pub fn tube_interface(
     let left = through(Passage::LEFT)?;
     // The mirror of u changes the sign of odd modes and exchanges left and right.
     let sign = |mode: usize| {
-        if basis.classes[mode] & 1 == 1 {
+        if basis.parity[mode] & 1 == 1 {
             -1.0
         } else {
             1.0

@@ -7,16 +7,15 @@
 
 use crate::modular::light_prior::tube::AreaWeights;
 use crate::modular::lightfield::grid::{LightfieldGrid, frame_of_heading};
-use crate::modular::lightfield::interface::LightfieldBasis;
 use crate::modular::lightfield::tube::{accumulate, point_of_uv, radiance_by_sample};
 use crate::modular::one_bounce::tube::{tube_entry_parity_classes, tube_texels};
-use crate::modular::transport::modes::whole_multiplets;
 use glam::{DVec2, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
 use mrt_core::geometry::tube::{SurfacePoint, TUBE_RADIUS, TubeForm};
 use mrt_core::linalg::matrix::{Matrix, transpose_multiply};
-use mrt_core::linalg::svd::{dropped_energy_beyond_first, svd};
+use mrt_core::linalg::parity_modes::{ModeChoice, ParityBasis};
+use mrt_core::linalg::svd::{Svd, svd};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -148,7 +147,7 @@ pub struct TubeResponse {
 /// Decomposes the response of a tube to the lightfield basis at one opening, in the measure of area.
 pub fn tube_response(
     grid: &LightfieldGrid,
-    basis: &LightfieldBasis,
+    basis: &ParityBasis,
     form: TubeForm,
     opening: Face,
     resolution: usize,
@@ -159,22 +158,20 @@ pub fn tube_response(
     let response = weights.weigh(&response);
     let scaled = response.scaled_columns(&basis.scales);
     let classes = tube_entry_parity_classes(form, resolution);
-    let mut parts: Vec<(f64, Vec<f64>)> = Vec::new();
-    for class in 0..classes.class_count() {
-        let part = svd(classes.fold_columns(class, &scaled).view());
-        for (k, &s) in part.singular_values.iter().enumerate() {
-            parts.push((s, classes.unfold(class, part.u.column(k))));
-        }
-    }
-    parts.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let singular_values: Vec<f64> = parts.iter().map(|part| part.0).collect();
-    let kept = whole_multiplets(&singular_values, response_modes);
-    let columns: Vec<&[f64]> = parts[..kept].iter().map(|part| part.1.as_slice()).collect();
-    let vectors = Matrix::from_columns(response.rows(), &columns);
+    let parts: Vec<Svd> = (0..classes.class_count())
+        .map(|class| svd(classes.fold_columns(class, &scaled).view()))
+        .collect();
+    let values = parts.iter().map(|part| &part.singular_values[..]);
+    let choice = ModeChoice::largest(values, response_modes);
+    let vectors = choice
+        .basis(&classes, |mode| {
+            parts[mode.class].u.column(mode.position).to_vec()
+        })
+        .vectors;
     TubeResponse {
         response_from_lightfield: transpose_multiply(vectors.view(), response.view()),
         response_basis: weights.unweigh(&vectors),
-        dropped_energy: dropped_energy_beyond_first(&singular_values, kept),
-        singular_values,
+        dropped_energy: choice.dropped_energy(),
+        singular_values: choice.singular_values,
     }
 }

@@ -11,7 +11,8 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::{Outline, SHAPES, Shape};
+use mrt_runtime::blocks::{SHAPES, Shape};
+use mrt_runtime::low_level::level::shape::Outline;
 use rayon::prelude::*;
 
 /// How radiosity between texel centres is reconstructed from the values there.

@@ -7,7 +7,7 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::lighting::sampling::{cosine_hemisphere_from_square, sobol_point, square_from_unit};
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
 use rayon::prelude::*;
 
 /// Distance, in block widths, by which rays start off the wall.
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
     use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce, restrict_to_shape};
     use crate::progress::Progress;
-    use mrt_runtime::level::shape::cubes;
+    use mrt_runtime::low_level::level::shape::cubes;
 
     #[test]
     fn rays_agree_with_the_closed_form() {

@@ -11,7 +11,7 @@ use mrt_core::geometry::polygon_moments::{Moments, polygon_moments};
 use mrt_core::lighting::hemisphere_sh::ohlsh_from_moments;
 use mrt_core::lighting::sh;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::Shape;
+use mrt_runtime::blocks::Shape;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -65,6 +65,16 @@ pub fn probe_points(per_axis: usize) -> impl Iterator<Item = DVec3> {
         );
         DVec3::new(center(x), center(y), center(z))
     })
+}
+
+/// Index of a probe's sample, in one of the [`DIRECTIONS`], among the samples of all `per_axis`³ probes of a block.
+pub fn probe_sample(point: DVec3, direction: IVec3, per_axis: usize) -> usize {
+    let cell = (point * per_axis as f64).floor().as_uvec3();
+    let probe = (cell.z as usize * per_axis + cell.y as usize) * per_axis + cell.x as usize;
+    // Place in the 3 x 3 x 3 neighbours of a cell, whose middle one is no direction.
+    let place = ((direction.z + 1) * 3 + direction.y + 1) * 3 + direction.x + 1;
+    let direction = if place > 13 { place - 1 } else { place };
+    probe * DIRECTIONS.len() + direction as usize
 }
 
 /// Between coefficients and samples of probes.

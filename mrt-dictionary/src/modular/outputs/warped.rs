@@ -3,7 +3,7 @@
 
 use crate::modular::one_bounce::warped::WarpedWalls;
 use crate::modular::outputs::cube::{SH9, sh_of_unit_radiosity, vector_of_unit_radiosity};
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::polygon_moments::{Moments, polygon_moments};
 use mrt_core::linalg::matrix::Matrix;
@@ -78,18 +78,6 @@ pub fn warped_texel_axes(walls: &WarpedWalls, texel: usize) -> [DVec3; 3] {
     [u, v, normal]
 }
 
-/// The rotation nearest to a warp's linear part (the limit of the mean of a matrix and its inverse transposed).
-pub fn rotation_part(jacobian: &DMat3) -> DMat3 {
-    // From a stretch of 1:100 ten steps reach rounding.
-    let mut rotation = *jacobian * (1.0 / libm::cbrt(jacobian.determinant()));
-    for _ in 0..POLAR_STEPS {
-        rotation = (rotation + rotation.inverse().transpose()) * 0.5;
-    }
-    rotation
-}
-
-const POLAR_STEPS: usize = 16;
-
 /// `rows[k] += weights[k] * signals`, rows one after the other.
 fn add(rows: &mut [f64], weights: &[f64], signals: &[f64]) {
     for (row, weight) in rows.chunks_exact_mut(signals.len().max(1)).zip(weights) {
@@ -149,7 +137,7 @@ mod tests {
     };
     use mrt_core::geometry::hexahedron::Hexahedron;
     use mrt_core::linalg::matrix::multiply;
-    use mrt_runtime::level::shape::Shape;
+    use mrt_runtime::blocks::Shape;
 
     #[test]
     fn on_the_cube_they_are_the_canonical_outputs() {
@@ -170,15 +158,5 @@ mod tests {
             }
         }
         assert_eq!(warped_texel_axes(&walls, 0), texel_axes(faces[0]));
-    }
-
-    #[test]
-    fn the_rotation_part_is_a_rotation_and_leaves_a_stretch() {
-        let turn = DMat3::from_rotation_y(0.7) * DMat3::from_rotation_x(-1.1);
-        let stretch = DMat3::from_diagonal(DVec3::new(9.0, 1.0, 0.3));
-        let found = rotation_part(&(turn * stretch));
-        let miss = found - turn;
-        // Newton's steps end at rounding.
-        assert!(miss.to_cols_array().iter().all(|x| x.abs() < 1e-12));
     }
 }

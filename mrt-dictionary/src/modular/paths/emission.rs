@@ -8,15 +8,14 @@
 use crate::modular::one_bounce::cube::wall_fraction;
 use crate::modular::paths::transport::{EMITTER, texel_at};
 use crate::modular::surface::mirrors::texel_parity_classes;
-use crate::modular::transport::modes::whole_multiplets;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::form_factor::point_to_polygon;
-use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_core::linalg::matrix::Matrix;
+use mrt_core::linalg::parity_modes::{GramModes, ModeChoice, add_gram_of_rows};
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 
 /// The emission basis.
 #[derive(Clone, Debug)]
@@ -73,52 +72,27 @@ pub fn emission_basis(sent: &[Matrix<f64>], resolution: usize, modes: usize) -> 
         .texels(resolution)
         .map(|(face, center)| opening_factor(face, center).sqrt())
         .collect();
-    let mut found: Vec<(f64, usize, Vec<f64>)> = Vec::new();
-    for class in 0..classes.class_count() {
-        let mut gram = Matrix::zeros(classes.dimension(class), classes.dimension(class));
-        for signals in sent {
-            let weighted = scaled_rows(signals, &root_weights);
-            let folded = classes.fold_columns(class, &weighted);
-            add_gram(&mut gram, &folded);
-        }
-        let (values, vectors) = symmetric_eigen(gram.view());
-        let largest = values.first().copied().unwrap_or(0.0);
-        for (k, &value) in values.iter().enumerate() {
-            if value > GRAM_FLOOR * largest && value > 0.0 {
-                found.push((value.sqrt(), class, vectors.column(k).to_vec()));
+    let parts: Vec<GramModes> = (0..classes.class_count())
+        .map(|class| {
+            let mut gram = Matrix::zeros(classes.dimension(class), classes.dimension(class));
+            for signals in sent {
+                let weighted = scaled_rows(signals, &root_weights);
+                add_gram_of_rows(&mut gram, &classes.fold_columns(class, &weighted));
             }
-        }
-    }
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let scales: Vec<f64> = found.iter().map(|mode| mode.0).collect();
-    let kept = whole_multiplets(&scales, modes);
-    let columns: Vec<Vec<f64>> = found[..kept]
-        .iter()
-        .map(|(_, class, vector)| {
-            let sign = largest_entry_sign(vector);
-            let vector: Vec<f64> = vector.iter().map(|x| sign * x).collect();
-            classes.unfold(*class, &vector)
+            GramModes::of(&gram)
         })
         .collect();
-    let basis = Matrix::from_columns(root_weights.len(), &columns);
+    let values = parts.iter().map(|part| &part.singular_values[..]);
+    let basis = ModeChoice::largest(values, modes).basis(&classes, |mode| {
+        parts[mode.class].vectors.column(mode.position).to_vec()
+    });
     let inverse: Vec<f64> = root_weights.iter().map(|w| 1.0 / w).collect();
     EmissionBasis {
-        from_radiosity: scaled_rows(&basis, &root_weights).transposed(),
-        radiosity: scaled_rows(&basis, &inverse),
-        parity: found[..kept].iter().map(|mode| mode.1 as u8).collect(),
-        dropped_energy: dropped_energy_beyond_first(&scales, kept),
-        scales: scales[..kept].to_vec(),
-    }
-}
-
-/// Eigenvalues of scalar products below this fraction of the largest are rounding: modes below 1e-6.
-pub(crate) const GRAM_FLOOR: f64 = 1e-12;
-
-/// `gram += columns columnsᵀ`
-pub(crate) fn add_gram(gram: &mut Matrix<f64>, columns: &Matrix<f64>) {
-    let product = multiply(columns.view(), columns.transposed().view());
-    for (sum, &x) in gram.data_mut().iter_mut().zip(product.data()) {
-        *sum += x;
+        from_radiosity: scaled_rows(&basis.vectors, &root_weights).transposed(),
+        radiosity: scaled_rows(&basis.vectors, &inverse),
+        parity: basis.parity,
+        dropped_energy: basis.dropped_energy,
+        scales: basis.scales,
     }
 }
 

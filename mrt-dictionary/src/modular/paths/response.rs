@@ -2,16 +2,16 @@
 //! section 5.1), and the operator of each path in it.
 
 use crate::modular::outputs::cube::{PROBE_WEIGHT, ProbeSamples, texel_axes};
-use crate::modular::paths::emission::{EmissionBasis, GRAM_FLOOR, add_gram};
+use crate::modular::paths::emission::EmissionBasis;
 use crate::modular::paths::transport::{Gather, Gathered, RECEIVER, Signals, gather};
 use crate::modular::surface::mirrors::{output_parity_classes, output_permutation};
-use crate::modular::transport::modes::whole_multiplets;
 use crate::progress::{Cancelled, Progress};
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
+use mrt_core::linalg::least_squares::pseudo_inverse;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::{dropped_energy_beyond_first, largest_entry_sign, symmetric_eigen};
-use mrt_runtime::modular::path::Word;
+use mrt_core::linalg::parity_modes::{GramModes, ModeChoice, add_gram_of_rows};
+use mrt_runtime::low_level::modular::path::Word;
 use rayon::prelude::*;
 
 /// The response basis and the paths' operators.
@@ -70,30 +70,19 @@ pub fn response_basis(
             light.scaled_columns(&vec![weight; deciding])
         })
         .collect();
-    let mut found: Vec<(f64, usize, Vec<f64>)> = (0..classes.class_count())
+    let parts = (0..classes.class_count())
         .into_par_iter()
         .map(|class| {
             progress.check()?;
-            Ok(modes_of_class(
-                &classes,
-                class,
-                &scaled,
-                exchange.as_deref(),
-            ))
+            let gram = gram_of_class(&classes, class, &scaled, exchange.as_deref());
+            Ok(GramModes::of(&gram))
         })
-        .collect::<Result<Vec<_>, Cancelled>>()?
-        .into_iter()
-        .flatten()
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let scales: Vec<f64> = found.iter().map(|mode| mode.0).collect();
-    let kept = whole_multiplets(&scales, modes);
-    let columns: Vec<Vec<f64>> = found[..kept]
-        .iter()
-        .map(|(_, class, vector)| classes.unfold(*class, vector))
-        .collect();
-    let basis = Matrix::from_columns(classes.point_count(), &columns);
-    let parity: Vec<u8> = found[..kept].iter().map(|mode| mode.1 as u8).collect();
+        .collect::<Result<Vec<GramModes>, Cancelled>>()?;
+    let values = parts.iter().map(|part| &part.singular_values[..]);
+    let found = ModeChoice::largest(values, modes).basis(&classes, |mode| {
+        parts[mode.class].vectors.column(mode.position).to_vec()
+    });
+    let (basis, parity) = (found.vectors, found.parity);
     let paths: Vec<Matrix<f64>> = gathered
         .par_iter()
         .map(|(light, _)| transpose_multiply(basis.view(), light.view()))
@@ -103,8 +92,8 @@ pub fn response_basis(
         basis,
         vector,
         parity,
-        dropped_energy: dropped_energy_beyond_first(&scales, kept),
-        scales: scales[..kept].to_vec(),
+        dropped_energy: found.dropped_energy,
+        scales: found.scales,
         paths,
     })
 }
@@ -140,39 +129,24 @@ fn path_weight(norm: f64) -> f64 {
     if norm > 0.0 { 1.0 / norm.sqrt() } else { 0.0 }
 }
 
-/// Singular values and left vectors of all paths' light, the part of one parity.
-fn modes_of_class(
+/// Scalar products of the rows of all paths' light, the part of one parity.
+fn gram_of_class(
     classes: &ParityClasses,
     class: usize,
     scaled: &[Matrix<f64>],
     exchange: Option<&[u32]>,
-) -> Vec<(f64, usize, Vec<f64>)> {
+) -> Matrix<f64> {
     let mut gram = Matrix::zeros(classes.dimension(class), classes.dimension(class));
     for light in scaled {
-        add_gram(&mut gram, &classes.fold_columns(class, light));
+        add_gram_of_rows(&mut gram, &classes.fold_columns(class, light));
         if let Some(exchange) = exchange {
             let exchanged = Matrix::from_fn(light.rows(), light.columns(), |i, j| {
                 light[(exchange[i] as usize, j)]
             });
-            add_gram(&mut gram, &classes.fold_columns(class, &exchanged));
+            add_gram_of_rows(&mut gram, &classes.fold_columns(class, &exchanged));
         }
     }
-    let (values, vectors) = symmetric_eigen(gram.view());
-    let largest = values.first().copied().unwrap_or(0.0);
-    values
-        .iter()
-        .enumerate()
-        .filter(|&(_, &value)| value > GRAM_FLOOR * largest && value > 0.0)
-        .map(|(k, &value)| {
-            let vector = vectors.column(k);
-            let sign = largest_entry_sign(vector);
-            (
-                value.sqrt(),
-                class,
-                vector.iter().map(|x| sign * x).collect(),
-            )
-        })
-        .collect()
+    gram
 }
 
 /// Vector irradiance of each mode: the linear function of the coefficients that fits that of all paths best.
@@ -242,24 +216,4 @@ fn of_own_parity(vector: &Matrix<f64>, parity: &[u8], resolution: usize) -> Matr
         });
     }
     part
-}
-
-/// Inverse of a symmetric positive matrix on the space where it is not lost in rounding.
-pub fn pseudo_inverse(matrix: &Matrix<f64>) -> Matrix<f64> {
-    let (values, vectors) = symmetric_eigen(matrix.view());
-    let largest = values.first().copied().unwrap_or(0.0);
-    let inverse: Vec<f64> = values
-        .iter()
-        .map(|&value| {
-            if value > GRAM_FLOOR * largest {
-                1.0 / value
-            } else {
-                0.0
-            }
-        })
-        .collect();
-    multiply(
-        vectors.scaled_columns(&inverse).view(),
-        vectors.transposed().view(),
-    )
 }

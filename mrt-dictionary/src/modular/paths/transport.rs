@@ -13,14 +13,15 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, cone_through, point_to_polygon};
 use mrt_core::geometry::polygon_moments::polygon_moments;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::{Aperture, Form, Hole, Outline, Shape};
-use mrt_runtime::modular::path::{Word, response_frame};
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::{Aperture, Hole, Outline, WallForm};
+use mrt_runtime::low_level::modular::path::{Word, response_frame};
 use rayon::prelude::*;
 
 /// The cube that light leaves through z = 1.
 pub static EMITTER: Shape = Shape {
     name: "emitter",
-    form: Form::Cube,
+    form: WallForm::Cube,
     openings: &[Aperture {
         face: Face::PosZ,
         outline: Outline::Whole,
@@ -30,7 +31,7 @@ pub static EMITTER: Shape = Shape {
 /// The cube that light enters through z = 0.
 pub static RECEIVER: Shape = Shape {
     name: "receiver",
-    form: Form::Cube,
+    form: WallForm::Cube,
     openings: &[Aperture {
         face: Face::NegZ,
         outline: Outline::Whole,

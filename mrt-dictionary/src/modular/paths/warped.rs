@@ -17,7 +17,6 @@ use crate::modular::joint::{ForeignLight, response_at};
 use crate::modular::one_bounce::cube::wall_fraction;
 use crate::modular::one_bounce::warped::WarpedWalls;
 use crate::modular::outputs::cube::{DIRECTIONS, PROBE_WEIGHT, ProbeSamples, SH9, probe_points};
-use crate::modular::outputs::warped::rotation_part;
 use crate::modular::paths::emission::opening_frame;
 use crate::modular::paths::response::{ResponseBasis, rows, stack};
 use crate::modular::paths::transport::{EMITTER, RECEIVER};
@@ -25,11 +24,13 @@ use glam::{DMat3, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
+use mrt_core::geometry::polar_decomposition::rotation_part;
 use mrt_core::geometry::polygon_moments::polygon_moments;
 use mrt_core::lighting::sh;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::shape::{Aperture, Shape};
-use mrt_runtime::modular::path::frame_of_heading;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::Aperture;
+use mrt_runtime::low_level::modular::path::frame_of_heading;
 use rayon::prelude::*;
 
 /// Rays along each axis of a texel of the canonical emitter.
@@ -37,6 +38,9 @@ const RAYS: usize = 3;
 
 /// Halvings in search of the wall that a ray ends on: 1e-9 of the block.
 const HALVINGS: usize = 32;
+
+/// Steps of the polar decomposition. Ten reach rounding from a stretch of 1:100.
+const POLAR_STEPS: usize = 16;
 
 /// A view from the middle of an opening of a warped block.
 pub struct OpeningView<'a> {
@@ -232,7 +236,7 @@ impl<'a> OpeningView<'a> {
             .map(|unit| {
                 let there = polygon_moments(unit, &canonical).solid_angle;
                 let here = polygon_moments(self.walls.warp.point(unit), portal).solid_angle;
-                let turn = rotation_part(&self.walls.warp.jacobian(unit));
+                let turn = rotation_part(&self.walls.warp.jacobian(unit), POLAR_STEPS);
                 (here / there, sh::rotation_matrices(3, &turn))
             })
             .collect();

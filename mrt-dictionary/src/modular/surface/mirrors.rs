@@ -1,13 +1,10 @@
 //! The mirrors that leave a canonical shape as it is, acting on its texels and probes.
 
-use crate::modular::outputs::cube::{DIRECTIONS, probe_points};
-use glam::{DVec3, IVec3};
-use mrt_core::geometry::cube::Face;
+use crate::modular::outputs::cube::{DIRECTIONS, probe_points, probe_sample};
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_runtime::level::mirrors::mirrors;
-use mrt_runtime::level::shape::Shape;
-use std::collections::HashMap;
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::mirrors::{mirrors, texel_permutation};
 
 /// Parity classes of the shape's texels: eight for cube, straight and cross, four for most others.
 pub fn texel_parity_classes(shape: &Shape, resolution: usize) -> ParityClasses {
@@ -35,37 +32,21 @@ pub fn output_permutation(
     probes: usize,
     map: CubeSymmetry,
 ) -> Vec<u32> {
-    // Texel and probe centres are odd multiples of half a step: exact as integers.
-    let texel = |face: Face, p: DVec3| (Some(face), scaled(p, resolution), IVec3::ZERO);
-    let probe = |p: DVec3, direction: IVec3| (None, scaled(p, probes), direction);
-    let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
-    let samples: Vec<(DVec3, IVec3)> = probe_points(probes)
-        .flat_map(|p| DIRECTIONS.iter().map(move |&d| (p, d)))
-        .collect();
-    let index: HashMap<_, u32> = texels
-        .iter()
-        .map(|&(face, p)| texel(face, p))
-        .chain(samples.iter().map(|&(p, d)| probe(p, d)))
-        .zip(0..)
-        .collect();
-    let texels = texels
-        .iter()
-        .map(|&(face, p)| texel(map.face(face), map.point(p)));
-    let samples = samples.iter().map(|&(p, d)| {
-        let d = map.direction(d.as_dvec3()).as_ivec3();
-        probe(map.point(p), d)
+    let texels = texel_permutation(shape, resolution, map);
+    let first_sample = texels.len();
+    let samples = probe_points(probes).flat_map(|point| {
+        DIRECTIONS.iter().map(move |direction| {
+            let direction = map.direction(direction.as_dvec3()).as_ivec3();
+            (first_sample + probe_sample(map.point(point), direction, probes)) as u32
+        })
     });
-    texels.chain(samples).map(|key| index[&key]).collect()
-}
-
-fn scaled(point: DVec3, steps: usize) -> IVec3 {
-    (point * (2 * steps) as f64).round().as_ivec3()
+    texels.iter().copied().chain(samples).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use mrt_runtime::level::shape::cubes;
+    use mrt_runtime::low_level::level::shape::cubes;
 
     #[test]
     fn fold_factors_are_those_of_the_shapes() {

@@ -9,91 +9,52 @@
 use crate::modular::one_bounce::warped::WarpedWalls;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::hexahedron::Hexahedron;
+use mrt_core::geometry::texel_permutation::texel_permutation;
 use mrt_core::linalg::parity::ParityClasses;
-use std::collections::HashMap;
 
 /// Fraction of a block's diagonal by which distances may differ and still be called equal: rounding of
 /// level files in decimal text, and far below what light would show.
 const EQUAL_DISTANCE: f64 = 1e-9;
 
-/// Takes axis k to `axes[k]`, reversed where `reversed[k]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct CubeSymmetry {
-    axes: [usize; 3],
-    reversed: [bool; 3],
+/// All 48 symmetries of the cube in the order in which they are tried: those that exchange no axes come first, and of
+/// these the mirrors of one axis before the half turns and the inversion that they compose.
+fn candidates() -> impl Iterator<Item = CubeSymmetry> {
+    const EXCHANGES: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [2, 1, 0],
+        [1, 0, 2],
+        [0, 2, 1],
+        [1, 2, 0],
+        [2, 0, 1],
+    ];
+    /// Bit k is set where axis k is reversed.
+    const REVERSALS: [usize; 8] = [0, 1, 2, 4, 3, 5, 6, 7];
+    EXCHANGES.into_iter().flat_map(|axes| {
+        REVERSALS.into_iter().filter_map(move |reversed| {
+            let image = |axis: usize| Face::from_axis(axes[axis], reversed >> axis & 1 == 0);
+            CubeSymmetry::from_images(image(0), image(1), image(2))
+        })
+    })
 }
 
-impl CubeSymmetry {
-    const IDENTITY: Self = Self {
-        axes: [0, 1, 2],
-        reversed: [false; 3],
+/// True if the symmetry takes walls to walls and keeps all distances between warped corners.
+fn keeps(symmetry: CubeSymmetry, walls: &WarpedWalls) -> bool {
+    let corners = &walls.warp.corners;
+    let slack = EQUAL_DISTANCE * walls.warp.diagonal();
+    let corner_image = |k: usize| {
+        let image = symmetry.point(Hexahedron::unit_corner(k));
+        let bits = (0..3).map(|axis| usize::from(image[axis] > 0.5) << axis);
+        corners[bits.sum::<usize>()]
     };
-
-    /// All 48, those that exchange no axes first.
-    fn all() -> impl Iterator<Item = Self> {
-        const EXCHANGES: [[usize; 3]; 6] = [
-            [0, 1, 2],
-            [2, 1, 0],
-            [1, 0, 2],
-            [0, 2, 1],
-            [1, 2, 0],
-            [2, 0, 1],
-        ];
-        // Mirrors of one axis come before the half turns and the inversion that they compose.
-        const REVERSALS: [usize; 8] = [0, 1, 2, 4, 3, 5, 6, 7];
-        EXCHANGES.into_iter().flat_map(|axes| {
-            REVERSALS.into_iter().map(move |bits| Self {
-                axes,
-                reversed: [0, 1, 2].map(|axis| bits >> axis & 1 == 1),
-            })
-        })
-    }
-
-    fn then(self, next: Self) -> Self {
-        Self {
-            axes: self.axes.map(|axis| next.axes[axis]),
-            reversed: [0, 1, 2].map(|k| self.reversed[k] ^ next.reversed[self.axes[k]]),
-        }
-    }
-
-    fn point(self, point: DVec3) -> DVec3 {
-        let mut image = DVec3::ZERO;
-        for k in 0..3 {
-            image[self.axes[k]] = if self.reversed[k] {
-                1.0 - point[k]
-            } else {
-                point[k]
-            };
-        }
-        image
-    }
-
-    fn face(self, face: Face) -> Face {
-        let axis = face.axis();
-        Face::from_axis(self.axes[axis], face.is_positive() != self.reversed[axis])
-    }
-
-    fn corner(self, k: usize) -> usize {
-        let image = self.point(Hexahedron::unit_corner(k));
-        (0..3)
-            .map(|axis| usize::from(image[axis] > 0.5) << axis)
-            .sum()
-    }
-
-    fn keeps(self, walls: &WarpedWalls) -> bool {
-        let corners = &walls.warp.corners;
-        let slack = EQUAL_DISTANCE * walls.warp.diagonal();
-        let keeps_distance = |a: usize, b: usize| {
-            let image = corners[self.corner(a)].distance(corners[self.corner(b)]);
-            (corners[a].distance(corners[b]) - image).abs() <= slack
-        };
-        walls
-            .faces
-            .iter()
-            .all(|&f| walls.faces.contains(&self.face(f)))
-            && (0..8).all(|a| (0..a).all(|b| keeps_distance(a, b)))
-    }
+    let keeps_distance = |a: usize, b: usize| {
+        let image = corner_image(a).distance(corner_image(b));
+        (corners[a].distance(corners[b]) - image).abs() <= slack
+    };
+    let faces = &walls.faces;
+    faces.iter().all(|&f| faces.contains(&symmetry.face(f)))
+        && (0..8).all(|a| (0..a).all(|b| keeps_distance(a, b)))
 }
 
 /// Parity classes of the texels under a largest set of commuting symmetries of the warped walls that are
@@ -101,37 +62,22 @@ impl CubeSymmetry {
 pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
     let mut generated = vec![CubeSymmetry::IDENTITY];
     let mut generators = Vec::new();
-    for symmetry in CubeSymmetry::all() {
+    for symmetry in candidates() {
         let is_new = !generated.contains(&symmetry)
-            && symmetry.then(symmetry) == CubeSymmetry::IDENTITY
+            && symmetry.after(symmetry) == CubeSymmetry::IDENTITY
             && generated
                 .iter()
-                .all(|&g| g.then(symmetry) == symmetry.then(g));
-        if is_new && symmetry.keeps(walls) {
-            let composed: Vec<_> = generated.iter().map(|g| g.then(symmetry)).collect();
+                .all(|&g| symmetry.after(g) == g.after(symmetry));
+        if is_new && keeps(symmetry, walls) {
+            let composed: Vec<_> = generated.iter().map(|&g| symmetry.after(g)).collect();
             generated.extend(composed);
             generators.push(symmetry);
         }
     }
-    // Texel centres are odd multiples of half a texel: exact as integers.
-    let key = |face: Face, p: DVec3| {
-        let scaled = p * (2 * walls.resolution) as f64;
-        (face, scaled.round().as_ivec3().to_array())
-    };
     let texels: Vec<(Face, DVec3)> = walls.unit_texels().collect();
-    let index: HashMap<_, u32> = texels
-        .iter()
-        .enumerate()
-        .map(|(k, &(face, p))| (key(face, p), k as u32))
-        .collect();
     let permutations: Vec<Vec<u32>> = generators
         .into_iter()
-        .map(|symmetry| {
-            texels
-                .iter()
-                .map(|&(face, p)| index[&key(symmetry.face(face), symmetry.point(p))])
-                .collect()
-        })
+        .map(|symmetry| texel_permutation(&texels, walls.resolution, symmetry))
         .collect();
     ParityClasses::new(texels.len(), &permutations)
 }
@@ -140,7 +86,7 @@ pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
 mod tests {
     use super::*;
     use crate::modular::surface::mirrors::texel_parity_classes;
-    use mrt_runtime::level::shape::{Outline, Shape, cubes};
+    use mrt_runtime::low_level::level::shape::{Outline, Shape, cubes};
 
     fn class_count(corner: impl Fn(DVec3) -> DVec3) -> usize {
         let warp = Hexahedron {

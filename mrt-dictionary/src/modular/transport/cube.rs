@@ -21,8 +21,9 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::svd::symmetric_eigen;
-use mrt_runtime::level::shape::{Outline, Shape};
-use mrt_runtime::modular::path::{Crossing, Word, hole_of};
+use mrt_runtime::blocks::Shape;
+use mrt_runtime::low_level::level::shape::Outline;
+use mrt_runtime::low_level::modular::path::{Crossing, Word, hole_of};
 
 /// A shape's operators: as [`BlockTransport`], with modes chosen for all outputs.
 pub type ShapeTransport = BlockTransport;

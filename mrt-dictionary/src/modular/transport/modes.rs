@@ -12,11 +12,8 @@
 use crate::modular::light_prior::cube::ScaledBasis;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::{dropped_energy_beyond_first, svd};
-
-/// Singular values closer than this, relatively, belong to one multiplet of the shape's symmetry, and a
-/// cut never separates them: which vectors of a multiplet come first is a matter of rounding.
-pub const MULTIPLET_TOLERANCE: f64 = 1e-6;
+use mrt_core::linalg::parity_modes::{ModeChoice, ParityMode};
+use mrt_core::linalg::svd::svd;
 
 /// The reduced operators of one shape, in texel space.
 #[derive(Clone, Debug)]
@@ -89,19 +86,14 @@ pub fn block_transport(
         .zip(&prior.classes)
         .map(|(outputs, basis)| svd(multiply(outputs.view(), basis.view()).view()))
         .collect();
-    let mut order: Vec<(usize, usize)> = (0..parts.len())
-        .flat_map(|class| (0..parts[class].singular_values.len()).map(move |k| (class, k)))
-        .collect();
-    let value = |&(class, k): &(usize, usize)| parts[class].singular_values[k];
-    order.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
-    let singular_values: Vec<f64> = order.iter().map(value).collect();
-    let kept = whole_multiplets(&singular_values, modes);
-
+    let values = parts.iter().map(|part| &part.singular_values[..]);
+    let choice = ModeChoice::largest(values, modes);
+    let kept = choice.kept.len();
     let mut indirect_columns = Vec::with_capacity(kept);
     let mut implicit_columns = Vec::with_capacity(kept);
     let mut coefficient_rows = Vec::with_capacity(kept);
-    for &(class, k) in &order[..kept] {
-        let part = &parts[class];
+    for &ParityMode { class, position } in &choice.kept {
+        let (part, k) = (&parts[class], position);
         let sigma = part.singular_values[k];
         let v = part.v.columns_view(k..k + 1);
         let implicit = multiply(prior.classes[class].view(), v);
@@ -117,35 +109,7 @@ pub fn block_transport(
         indirect_basis: Matrix::from_columns(texels, &indirect_columns),
         coefficients_from_direct: Matrix::from_columns(texels, &coefficient_rows).transposed(),
         implicit_lighting: Matrix::from_columns(texels, &implicit_columns),
-        dropped_energy: dropped_energy_beyond_first(&singular_values, kept),
-        singular_values,
+        dropped_energy: choice.dropped_energy(),
+        singular_values: choice.singular_values,
     }
-}
-
-/// The largest count up to `modes` that does not cut through equal singular values, and leaves out
-/// those lost in rounding.
-pub fn whole_multiplets(singular_values: &[f64], modes: usize) -> usize {
-    let largest = singular_values.first().copied().unwrap_or(0.0);
-    let significant = singular_values
-        .iter()
-        .take_while(|&&s| s > 1e-12 * largest)
-        .count();
-    let mut kept = modes.min(significant);
-    if kept < significant {
-        let next = singular_values[kept];
-        while kept > 0 && singular_values[kept - 1] - next <= MULTIPLET_TOLERANCE * next {
-            kept -= 1;
-        }
-        // The first multiplet stays even where it is larger than asked for: no modes are no basis.
-        while kept == 0
-            || singular_values[0] - singular_values[kept]
-                <= MULTIPLET_TOLERANCE * singular_values[0]
-        {
-            kept += 1;
-            if kept == significant {
-                break;
-            }
-        }
-    }
-    kept
 }

@@ -16,11 +16,11 @@
 use crate::config::Enrichment;
 use crate::modular::one_bounce::warped::WarpedWalls;
 use crate::modular::surface::warped_mirrors::warped_parity_classes;
-use crate::modular::transport::modes::{BlockTransport, fold_bounce, whole_multiplets};
-use crate::modular::transport::snapshots::{Snapshots, combined, parallel_multiply};
+use crate::modular::transport::modes::{BlockTransport, fold_bounce};
+use crate::parallel_products::parallel_multiply;
 use mrt_core::linalg::matrix::{Matrix, dot};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::dropped_energy_beyond_first;
+use mrt_core::linalg::parity_modes::{ModeChoice, ParityMode, Snapshots, combined_columns};
 use rayon::prelude::*;
 
 /// What a rebuild is free to choose.
@@ -122,20 +122,15 @@ fn assembled(
         .par_iter()
         .map(|(images, _)| Snapshots::of(images))
         .collect();
-    let mut order: Vec<(usize, usize)> = (0..parts.len())
-        .flat_map(|class| (0..parts[class].singular_values.len()).map(move |k| (class, k)))
-        .collect();
-    let value = |&(class, k): &(usize, usize)| parts[class].singular_values[k];
-    order.sort_by(|a, b| value(b).total_cmp(&value(a)).then(a.cmp(b)));
-    let singular_values: Vec<f64> = order.iter().map(value).collect();
-    let kept = whole_multiplets(&singular_values, modes);
-    let columns: Vec<[Vec<f64>; 3]> = order[..kept]
+    let choice = ModeChoice::largest(parts.iter().map(Snapshots::singular_values), modes);
+    let columns: Vec<[Vec<f64>; 3]> = choice
+        .kept
         .par_iter()
-        .map(|&(class, k)| {
-            let sigma = parts[class].singular_values[k];
+        .map(|&ParityMode { class, position }| {
+            let sigma = parts[class].singular_values()[position];
             let (images, prior) = &emitted[class];
-            let (u, v) = parts[class].pair(images, k);
-            let implicit = combined(prior, &v);
+            let (u, v) = parts[class].pair(images, position);
+            let implicit = combined_columns(prior, &v);
             let row: Vec<f64> = (0..folded[class].columns())
                 .map(|j| dot(folded[class].column(j), &u) / sigma)
                 .collect();
@@ -160,8 +155,8 @@ fn assembled(
         indirect_basis: gather(0),
         implicit_lighting: gather(1),
         coefficients_from_direct: gather(2).transposed(),
-        dropped_energy: dropped_energy_beyond_first(&singular_values, kept),
-        singular_values,
+        dropped_energy: choice.dropped_energy(),
+        singular_values: choice.singular_values,
     }
 }
 
@@ -218,7 +213,7 @@ mod tests {
     use mrt_core::geometry::cube::Face;
     use mrt_core::geometry::hexahedron::Hexahedron;
     use mrt_core::linalg::matrix::multiply;
-    use mrt_runtime::level::shape::SHAPES;
+    use mrt_runtime::blocks::SHAPES;
 
     const RESOLUTION: usize = 8;
 

@@ -8,10 +8,9 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::level::warp_form::{Form, form_of, same_form, warp_of};
-use mrt_runtime::modular::dictionary::{Dictionary, WarpTransport};
+use mrt_runtime::blocks::{Shape, WarpTransport};
+use mrt_runtime::low_level::level::warp_form::{WarpForm, form_of, same_form, warp_of};
+use mrt_runtime::{Dictionary, Level};
 
 /// What a block's light is expected to err by, by transport: the first bounce within the block, relative L2.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,13 +76,13 @@ pub fn estimate_blocks(
     dictionary: &Dictionary,
     progress: &Progress,
 ) -> Result<Vec<BlockEstimate>, VariantError> {
-    let mut known: Vec<(&Shape, Form, BlockEstimate)> = Vec::new();
+    let mut known: Vec<(&Shape, WarpForm, BlockEstimate)> = Vec::new();
     let mut cubes: Vec<(&Shape, f64)> = Vec::new();
     let mut estimates = Vec::with_capacity(level.blocks.len());
     for (index, block) in level.blocks.iter().enumerate() {
         let shape = block.shape;
         let form = form_of(block);
-        let same = |(other, corners, _): &&(&Shape, Form, BlockEstimate)| {
+        let same = |(other, corners, _): &&(&Shape, WarpForm, BlockEstimate)| {
             *other == shape && same_form(corners, &form)
         };
         if let Some((_, _, estimate)) = known.iter().find(same) {

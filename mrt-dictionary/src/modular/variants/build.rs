@@ -21,12 +21,13 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::shape::{Outline, Shape};
-use mrt_runtime::level::warp_form::{Form, form_of, same_form, warp_of};
-use mrt_runtime::modular::dictionary::{
-    Dictionary, OpeningOperators, ShapeOperators, Sources, Variant, WarpTransport,
+use mrt_runtime::blocks::{Shape, WarpTransport};
+use mrt_runtime::low_level::level::shape::Outline;
+use mrt_runtime::low_level::level::warp_form::{WarpForm, form_of, same_form, warp_of};
+use mrt_runtime::low_level::modular::dictionary::{
+    OpeningOperators, ShapeOperators, Sources, Variant,
 };
+use mrt_runtime::{Dictionary, Level};
 
 /// What making variants is free to choose.
 #[derive(Clone, Debug, PartialEq)]
@@ -148,8 +149,8 @@ pub fn make_variants(
 fn wanted<'a>(
     level: &Level,
     dictionary: &'a Dictionary,
-) -> Result<Vec<(&'a ShapeOperators, Form, WarpTransport)>, VariantError> {
-    let mut wanted: Vec<(&ShapeOperators, Form, WarpTransport)> = Vec::new();
+) -> Result<Vec<(&'a ShapeOperators, WarpForm, WarpTransport)>, VariantError> {
+    let mut wanted: Vec<(&ShapeOperators, WarpForm, WarpTransport)> = Vec::new();
     for (index, block) in level.blocks.iter().enumerate() {
         let position = dictionary
             .shape_index(block.shape)
@@ -251,7 +252,7 @@ struct OwnTransport {
 }
 
 impl Maker<'_> {
-    fn operators(&self, form: &Form, transport: WarpTransport) -> ShapeOperators {
+    fn operators(&self, form: &WarpForm, transport: WarpTransport) -> ShapeOperators {
         let (resolution, probes) = (self.dictionary.resolution, self.dictionary.probes);
         let shape = self.canonical.shape;
         let faces: Vec<Face> = shape.walls().collect();

@@ -2,11 +2,10 @@
 
 use crate::cli::dictionary_source::SourceError;
 use crate::document::level_file::LevelFileError;
-use crate::import::ImportError;
+use crate::import::error::ImportError;
 use crate::render::file::WriteError;
 use glam::Vec3;
-use mrt_runtime::modular::assemble::AssembleError;
-use mrt_runtime::modular::frame::FrameError;
+use mrt_runtime::{AssembleError, SkippedLight};
 use std::path::PathBuf;
 
 /// Why there are no pictures.
@@ -48,7 +47,7 @@ pub enum LightCommandError {
     Assemble(#[from] AssembleError),
     /// A light is refused.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Skipped(#[from] SkippedLight),
     /// A light is outside every block.
     #[error(
         "light {light} at {position} m lies in no block: {distance:.3} m outside block {block}, the \

@@ -3,11 +3,12 @@
 use super::View;
 use crate::receiver::unwrap::LitTriangle;
 use crate::render::Picture;
-use crate::render::file::{WriteError, write_hdr, write_png};
+use crate::render::file::{Saves, WriteError, write_hdr, write_png};
 use crate::render::lit::LitScene;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::Vec3;
 use mrt_core::container::write_file_atomically;
+use mrt_runtime::BlockIndex;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -57,7 +58,7 @@ fn write_files(
         for (picture, suffix) in view.pictures.iter().zip(["-direct", "-indirect", ""]) {
             let path = name(format!("{}{suffix}.png", view.name));
             let pixels = tone_map(picture, view.exposure);
-            write_png(&path, [picture.width, picture.height], &pixels)?;
+            write_png(&path, [picture.width, picture.height], &pixels, Saves::Time)?;
         }
     }
     let lightmap = Picture {
@@ -67,7 +68,7 @@ fn write_files(
     };
     let size = [lightmap.width, lightmap.height];
     let pixels = tone_map(&lightmap, auto_exposure(&[&lightmap]));
-    write_png(&name("lightmap.png".to_owned()), size, &pixels)?;
+    write_png(&name("lightmap.png".to_owned()), size, &pixels, Saves::Time)?;
     write_hdr(&name("lightmap.hdr".to_owned()), &lightmap)?;
     let obj = obj_text(lit, unwrapped);
     write_file_atomically(&name("mesh.obj".to_owned()), obj.as_bytes())?;
@@ -108,7 +109,7 @@ fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
             let (u, v) = (receiver.u as f32, receiver.v as f32);
             let uv = lit
                 .atlas
-                .texture_coordinate(receiver.block, receiver.face, u, v)
+                .texture_coordinate(BlockIndex::new(receiver.block), receiver.face, u, v)
                 .unwrap_or_default();
             let next = coordinates.len() + 1;
             let coordinate = *coordinates

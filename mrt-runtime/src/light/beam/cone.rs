@@ -3,10 +3,13 @@
 //! Each opening's polygon is clipped by the cone (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974), and
 //! the planes through the light and its remaining edges are the next cone.
 
-use super::MAX_PLANES;
-use crate::light::placed::Light;
-use crate::modular::scene::{Portal, SceneBlock};
+use crate::level::placed::{PlacedBlock, Portal};
+use crate::light::source::Light;
 use glam::{DVec3, Vec3};
+
+/// Planes of a beam, at most. Openings of four corners give four, and more where crooked ones overlap; round openings
+/// are beyond it.
+pub const MAX_PLANES: usize = 16;
 
 /// Corners of an opening, at most: those of a tube's end.
 const MAX_CORNERS: usize = 32;
@@ -341,7 +344,7 @@ impl Source {
     }
 
     /// True if a spot's cone passes a block by, and so everything beyond it that light reaches through the block.
-    pub(super) fn misses(&self, block: &SceneBlock) -> bool {
+    pub(super) fn misses(&self, block: &PlacedBlock) -> bool {
         let (low, high) = block.bounds;
         // With a margin for angles that kernels round.
         let (center, radius) = (0.5 * (low + high), 0.501 * (high - low).length());

@@ -1,10 +1,11 @@
 //! A beam's light on the texels of its block, many texels at once.
 //!
-//! The formulas are those of [`irradiance`](super::irradiance) in `f32`, the angle from a spot's axis by a polynomial.
+//! The formulas are those of [`irradiance`](crate::light::direct_light::irradiance) in `f32`, the angle from a spot's axis by a polynomial.
 
-use super::MIN_RADIUS;
 use crate::light::beam::Beam;
-use crate::light::placed::{Light, PlacedLight};
+use crate::light::limits::MIN_RADIUS;
+use crate::light::placed::PlacedLight;
+use crate::light::source::Light;
 use glam::Vec3;
 use mrt_core::simd::{Kernel, Lanes, SimdLevel, WIDEST};
 use std::f32::consts::PI;
@@ -22,7 +23,7 @@ pub struct TexelPlanes<'a> {
 /// Adds the irradiance, W/m², of one beam to `out`: red, green and blue, as long as the texels' slices. Padding
 /// gets exactly 0. The beam must not be [exact](Beam::exact).
 ///
-/// At lit texels it is that of [`irradiance`](super::irradiance) within 1e-5 of it and, since cosines are rounded,
+/// At lit texels it is that of [`irradiance`](crate::light::direct_light::irradiance) within 1e-5 of it and, since cosines are rounded,
 /// 1e-6 of what the texel would get if it faced the light. Between the angles of a spot, the falloff is that of an
 /// angle within 2e-6 rad. A texel within 1e-15 m of a light's centre gets less, as it gets nothing at the centre.
 ///

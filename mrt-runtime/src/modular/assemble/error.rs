@@ -1,7 +1,7 @@
 //! What assembly refuses.
 
-use super::MAX_DEPTH;
-use crate::level::block::LevelError;
+use crate::level::error::LevelError;
+use crate::modular::assemble::config::MAX_DEPTH;
 use mrt_core::geometry::cube::Face;
 
 /// Why a level and a dictionary do not make a scene.
@@ -23,7 +23,7 @@ pub enum AssembleError {
     /// The dictionary was packed for levels without such a path.
     #[error(
         "block {block}: light that leaves through face {face} goes the way `{word}`, for which the dictionary has \
-         no operator; expected one packed for this level (mrt pack)"
+         no operator; expected a dictionary that was packed for this level"
     )]
     MissingPath {
         /// Where it comes from.
@@ -35,21 +35,20 @@ pub enum AssembleError {
     },
     /// The dictionary was packed without lightfields, or has neither these nor a path table.
     #[error(
-        "the level joins blocks by lightfields; found none in the dictionary, expected one with them (packed \
-         without --coupling table)"
+        "the level joins blocks by lightfields; found none in the dictionary, expected a dictionary with lightfields"
     )]
     MissingLightfields,
     /// A block wants operators for its warp that nobody has made.
     #[error(
-        "block {block}: the dictionary has no {transport} operators for its shape `{shape}` in this form; run \
-         `mrt adapt` on the level, or set its transport to \"canonical\""
+        "block {block}: the dictionary has no {transport} operators for its shape `{shape}` in this form; expected \
+         a dictionary adapted to this level, or the transport \"canonical\""
     )]
     MissingVariant {
         /// Which block.
         block: usize,
         /// Its shape.
         shape: &'static str,
-        /// [`WarpTransport::name`](crate::modular::dictionary::WarpTransport::name) of what it wants.
+        /// [`WarpTransport::name`](crate::level::warp_transport::WarpTransport::name) of what it wants.
         transport: &'static str,
     },
     /// More openings than paths are followed through.
@@ -71,7 +70,7 @@ pub enum AssembleError {
         "the scene needs over {found} bytes; expected at most {expected} (AssembleConfig::max_bytes)"
     )]
     TooLarge {
-        /// [`AssembleConfig::max_bytes`](super::AssembleConfig::max_bytes).
+        /// [`AssembleConfig::max_bytes`](crate::modular::assemble::config::AssembleConfig::max_bytes).
         expected: usize,
         /// What it takes at least.
         found: usize,

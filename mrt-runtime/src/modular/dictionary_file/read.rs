@@ -1,16 +1,16 @@
 //! Reads version 2.
 
-use super::write::{scales_name, transport_name};
-use super::{
-    DictionaryError, Hole, MAX_MODES, MAX_PROBES, MAX_RESOLUTION, MAX_VARIANTS, MAX_WORD, SHAPES,
-    Source, check_size, known_shape,
-};
-use crate::level::shape::Shape;
+use crate::level::shape::{Hole, SHAPES, Shape};
+use crate::level::warp_transport::WarpTransport;
 use crate::modular::dictionary::{
     LightfieldOperators, OpeningOperators, OperatorKind, PathEntry, PathTable, ShapeOperators,
-    Sources, StoredDictionary, Variant, WarpTransport,
+    Sources, StoredDictionary, Variant,
 };
-use crate::modular::path::Word;
+use crate::modular::dictionary_file::format::{
+    DictionaryError, MAX_MODES, MAX_PROBES, MAX_RESOLUTION, MAX_VARIANTS, Source, check_size,
+    known_shape, scales_name,
+};
+use crate::modular::path::{MAX_WORD, Word};
 use mrt_core::storage::{StoredMatrix, StoredSection, read_stored};
 
 type Operators<'a> = ShapeOperators<StoredMatrix<'a>>;
@@ -284,14 +284,7 @@ fn variant_of_name(name: &str, shapes: &[Operators]) -> Option<(WarpTransport, &
     if shape.tube().is_some() {
         return None;
     }
-    let transport = [
-        WarpTransport::Canonical,
-        WarpTransport::Regathered,
-        WarpTransport::Rebuilt,
-    ]
-    .into_iter()
-    .find(|&known| transport_name(known) == transport)?;
-    Some((transport, shape))
+    Some((WarpTransport::from_name(transport)?, shape))
 }
 
 fn read_shape<'a>(

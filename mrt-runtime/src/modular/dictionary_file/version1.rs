@@ -11,12 +11,13 @@
 //! response modes); for shape n `n.name`, `n.sigma`, `n.T_d_b`, `n.U_b`, `n.L_imp`, `n.drop` and one `n.R<m>` an
 //! opening. All numbers are F32. Shapes opened sideways only.
 
-use super::write::scales_name;
-use super::{DictionaryError, MAX_MODES, MAX_RESOLUTION, SHAPES, Source, check_size, known_shape};
-use crate::level::shape::{Outline, Shape};
+use crate::level::shape::{Outline, SHAPES, Shape};
 use crate::modular::dictionary::{
     LightfieldOperators, OpeningOperators, OperatorKind, OperatorMatrix, PathTable, ShapeOperators,
     StoredDictionary,
+};
+use crate::modular::dictionary_file::format::{
+    DictionaryError, MAX_MODES, MAX_RESOLUTION, Source, check_size, known_shape, scales_name,
 };
 use crate::modular::path::frame_of_heading;
 use mrt_core::geometry::cube::Face;

@@ -1,8 +1,8 @@
 //! Writes version 2.
 
-use super::{DictionaryError, FORMAT, MAX_VARIANTS, check_size};
-use crate::modular::dictionary::{
-    Dictionary, OperatorKind, OperatorMatrix, ShapeOperators, WarpTransport,
+use crate::modular::dictionary::{Dictionary, OperatorKind, OperatorMatrix, ShapeOperators};
+use crate::modular::dictionary_file::format::{
+    DictionaryError, FORMAT, MAX_VARIANTS, check_size, scales_name,
 };
 use mrt_core::container::{ContainerError, Writer};
 use mrt_core::storage::write_stored;
@@ -77,7 +77,7 @@ impl<M: OperatorMatrix> Dictionary<M> {
         let shapes = self.shapes.iter().map(|entry| entry.shape.name);
         writer.add_text("shapes", &shapes.collect::<Vec<_>>().join(" "))?;
         let variants = self.variants.iter().map(|variant| {
-            let transport = transport_name(variant.transport);
+            let transport = variant.transport.name();
             format!("{}:{transport}", variant.operators.shape.name)
         });
         writer.add_text("variants", &variants.collect::<Vec<_>>().join(" "))?;
@@ -99,20 +99,6 @@ impl<M: OperatorMatrix> Dictionary<M> {
         }
         Ok(writer.finish())
     }
-}
-
-/// As in the section `variants`.
-pub(super) fn transport_name(transport: WarpTransport) -> &'static str {
-    match transport {
-        WarpTransport::Canonical => "canonical",
-        WarpTransport::Regathered => "regathered",
-        WarpTransport::Rebuilt => "rebuilt",
-    }
-}
-
-/// Name of the section of scales of a matrix.
-pub(super) fn scales_name(values: &str) -> String {
-    format!("{values}*")
 }
 
 fn add(

@@ -1,12 +1,15 @@
-//! What callers choose.
+//! What callers choose about frames.
 
 use crate::executor::{Executor, Serial};
-use crate::output::probes::ProbeOrder;
+use crate::output::probe_order::ProbeOrder;
 use mrt_core::simd::SimdLevel;
 use std::num::NonZero;
 use std::sync::Arc;
 
-/// Which bounces a frame computes; more than [`MAX_PASSES`](super::MAX_PASSES) passes are not made.
+/// Passes in one frame, at most: at albedo 0.99 the light left after them is 1e-18 of the first.
+pub const MAX_PASSES: u32 = 4096;
+
+/// Which bounces a frame computes; more than [`MAX_PASSES`] passes are not made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounces {
     /// This many, each a pass over the reduced operators; 0 leaves indirect light at zero.
@@ -50,6 +53,8 @@ impl Default for Outputs {
 pub struct FrameConfig {
     /// What to compute besides irradiance.
     pub outputs: Outputs,
+    /// How often light is reflected.
+    pub bounces: Bounces,
     /// Instructions to use; the scalar reference where the machine lacks them.
     pub simd: SimdLevel,
     /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, and by which light
@@ -71,10 +76,12 @@ pub struct FrameConfig {
 }
 
 impl Default for FrameConfig {
-    /// The lightmap, with the best instructions that the machine has, everything up to date, on the caller's thread.
+    /// The lightmap, one more bounce each frame, with the best instructions that the machine has, everything up to date,
+    /// on the caller's thread.
     fn default() -> Self {
         Self {
             outputs: Outputs::default(),
+            bounces: Bounces::Feedback,
             simd: SimdLevel::detect(),
             tolerance: 0.0,
             slice: None,

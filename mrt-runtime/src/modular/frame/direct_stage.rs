@@ -1,13 +1,17 @@
 //! Direct light: only for blocks whose light may have changed.
 
-use super::pass::{CutPlanes, part_of, span};
-use super::{Bounces, Frame, FrameWork};
 use crate::executor::{run_parts, task_count};
 use crate::light::beam::{Beam, BeamTracer};
-use crate::light::direct_light::{TexelPlanes, add_beam, add_exact, irradiance};
+use crate::light::direct_light::add_beam::{TexelPlanes, add_beam};
+use crate::light::direct_light::{Shadows, add_exact, irradiance};
+use crate::light::limits::MAX_LIGHTS;
 use crate::light::placed::PlacedLight;
-use crate::light::visibility::{Receiver, Visibility};
-use crate::modular::scene::Scene;
+use crate::light::visibility::{Openings, Receiver, Visibility};
+use crate::modular::frame::config::FrameConfig;
+use crate::modular::frame::schedule::Schedule;
+use crate::modular::frame::split::{CutPlanes, part_of, span};
+use crate::modular::scene::SceneData;
+use crate::output::texel_layout::{BlockRank, Planes};
 use glam::Vec3;
 use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 use std::collections::VecDeque;
@@ -25,8 +29,6 @@ const MAX_BEAMS: usize = 1 << 16;
 /// What the direct light that a frame holds was computed from, and what is still to be done.
 #[derive(Debug)]
 pub(super) struct DirectStage {
-    /// Lights of the frame that begins.
-    pub next: Vec<PlacedLight>,
     /// Lights whose light there is, once no block waits.
     now: Vec<PlacedLight>,
     doors: Vec<f32>,
@@ -40,16 +42,16 @@ pub(super) struct DirectStage {
     /// There was no room for all beams.
     overflow: bool,
     /// (block, beam) of the blocks in `list`, ascending.
-    hits: Vec<(u32, u32)>,
+    hits: Vec<(BlockRank, u32)>,
     is_listed: Vec<bool>,
     /// [`Visibility::version`] of the one asked last.
     version: Option<u64>,
     source: Source,
     /// Blocks that wait for direct light, oldest first.
-    waiting: VecDeque<u32>,
+    waiting: VecDeque<BlockRank>,
     is_waiting: Vec<bool>,
     /// Blocks of this frame, ascending.
-    list: Vec<u32>,
+    list: Vec<BlockRank>,
     found: Vec<Found>,
     /// New irradiance of a block, by task.
     scratch: Vec<Aligned<f32>>,
@@ -72,18 +74,18 @@ struct Found {
 }
 
 impl DirectStage {
-    pub(super) fn new(scene: &Scene, tasks: usize, slots: usize) -> Self {
-        let blocks = scene.blocks.len();
+    pub(super) fn new(scene: &SceneData, tasks: usize) -> Self {
+        let blocks = scene.level.blocks.len();
         let room = (BEAMS_PER_BLOCK * blocks + SPARE_BEAMS).min(MAX_BEAMS);
+        let slots = scene.layout.most_slots();
         Self {
-            next: Vec::with_capacity(super::MAX_LIGHTS),
-            now: Vec::with_capacity(super::MAX_LIGHTS),
-            doors: scene.doors.clone(),
-            tracer: BeamTracer::new(scene),
+            now: Vec::with_capacity(MAX_LIGHTS),
+            doors: scene.level.doors.clone(),
+            tracer: BeamTracer::new(&scene.level),
             beams: Vec::with_capacity(room),
-            beams_of: Vec::with_capacity(super::MAX_LIGHTS),
+            beams_of: Vec::with_capacity(MAX_LIGHTS),
             next_beams: Vec::with_capacity(room),
-            next_beams_of: Vec::with_capacity(super::MAX_LIGHTS),
+            next_beams_of: Vec::with_capacity(MAX_LIGHTS),
             overflow: false,
             hits: Vec::with_capacity(room),
             is_listed: vec![false; blocks],
@@ -97,19 +99,6 @@ impl DirectStage {
         }
     }
 
-    /// Slots that a block may have.
-    pub(super) fn slots(&self) -> usize {
-        self.scratch.first().map_or(0, |scratch| scratch.len() / 3)
-    }
-
-    /// Dark, whatever the scene.
-    pub(super) fn restart(&mut self, scene: &Scene) {
-        self.forget();
-        self.waiting.clear();
-        self.is_waiting.fill(false);
-        self.tracer.restart(scene);
-    }
-
     /// The next frame computes all direct light anew.
     pub(super) fn forget(&mut self) {
         self.now.clear();
@@ -118,40 +107,28 @@ impl DirectStage {
         self.source = Source::Nowhere;
     }
 
-    /// Traces lights that are not what they were, and lets blocks wait that those light, or did.
-    fn trace(&mut self, scene: &Scene, doors: &[f32], kept: bool) {
-        let layout = &scene.layout;
+    /// Traces lights that are not what they were, and lets blocks wait that those light, or did. Beams of the others are
+    /// kept if `keep`.
+    fn trace(&mut self, scene: &SceneData, next: &[PlacedLight], doors: &[f32], keep: bool) {
         self.next_beams.clear();
         self.next_beams_of.clear();
         let had_overflow = std::mem::take(&mut self.overflow);
-        for k in 0..self.next.len() {
+        for (k, light) in next.iter().enumerate() {
             let start = self.next_beams.len();
-            let known = kept && !had_overflow && self.now.get(k) == Some(&self.next[k]);
-            if known {
-                let range = self.beams_of[k].clone();
-                self.overflow |= range.len() > self.next_beams.capacity() - start;
-                if !self.overflow {
-                    self.next_beams.extend_from_slice(&self.beams[range]);
-                }
+            let is_known = keep && !had_overflow && self.now.get(k) == Some(light);
+            if is_known {
+                self.keep_beams(k);
             } else {
-                let (beams, overflow) = (&mut self.next_beams, &mut self.overflow);
-                let emit = &mut |beam: &Beam| {
-                    *overflow |= beams.len() == beams.capacity();
-                    if !*overflow {
-                        beams.push(*beam);
-                    }
-                };
-                self.tracer
-                    .trace(scene, k as u32, &self.next[k], doors, emit);
+                self.trace_light(scene, k, light, doors);
             }
             if self.overflow {
                 break;
             }
             self.next_beams_of.push(start..self.next_beams.len());
-            if !known {
+            if !is_known {
                 for at in start..self.next_beams.len() {
-                    let block = self.next_beams[at].block as usize;
-                    self.wait_for(layout.rank[block]);
+                    let block = self.next_beams[at].block;
+                    self.wait_for(scene.layout.rank[block.get()]);
                 }
             }
         }
@@ -160,15 +137,15 @@ impl DirectStage {
                 self.next_beams.clear();
                 self.next_beams_of.clear();
             }
-            for block in 0..layout.block_count() as u32 {
+            for block in scene.layout.ranks() {
                 self.wait_for(block);
             }
         }
         for k in 0..self.beams_of.len() {
-            if !kept || self.next.get(k) != self.now.get(k) {
+            if !keep || next.get(k) != self.now.get(k) {
                 for at in self.beams_of[k].clone() {
-                    let block = self.beams[at].block as usize;
-                    self.wait_for(layout.rank[block]);
+                    let block = self.beams[at].block;
+                    self.wait_for(scene.layout.rank[block.get()]);
                 }
             }
         }
@@ -176,20 +153,42 @@ impl DirectStage {
         std::mem::swap(&mut self.beams_of, &mut self.next_beams_of);
     }
 
+    /// Takes over the beams of a light that is what it was.
+    fn keep_beams(&mut self, light: usize) {
+        let range = self.beams_of[light].clone();
+        let room = self.next_beams.capacity() - self.next_beams.len();
+        self.overflow |= range.len() > room;
+        if !self.overflow {
+            self.next_beams.extend_from_slice(&self.beams[range]);
+        }
+    }
+
+    fn trace_light(&mut self, scene: &SceneData, index: usize, light: &PlacedLight, doors: &[f32]) {
+        let (beams, overflow) = (&mut self.next_beams, &mut self.overflow);
+        let emit = &mut |beam: &Beam| {
+            *overflow |= beams.len() == beams.capacity();
+            if !*overflow {
+                beams.push(*beam);
+            }
+        };
+        self.tracer
+            .trace(&scene.level, index as u32, light, doors, emit);
+    }
+
     /// Finds the beams that light the listed blocks.
-    fn find_hits(&mut self, scene: &Scene) {
+    fn find_hits(&mut self, scene: &SceneData) {
         self.hits.clear();
         for &block in &self.list {
-            self.is_listed[block as usize] = true;
+            self.is_listed[block.get()] = true;
         }
         for (beam, at) in self.beams.iter().zip(0..) {
-            let place = scene.layout.rank[beam.block as usize];
-            if self.is_listed[place as usize] {
-                self.hits.push((place, at));
+            let rank = scene.layout.rank[beam.block.get()];
+            if self.is_listed[rank.get()] {
+                self.hits.push((rank, at));
             }
         }
         for &block in &self.list {
-            self.is_listed[block as usize] = false;
+            self.is_listed[block.get()] = false;
         }
         self.hits.sort_unstable();
     }
@@ -199,97 +198,111 @@ impl DirectStage {
         !self.waiting.is_empty()
     }
 
-    fn wait_for(&mut self, block: u32) {
-        if !self.is_waiting[block as usize] {
-            self.is_waiting[block as usize] = true;
+    fn wait_for(&mut self, block: BlockRank) {
+        if !self.is_waiting[block.get()] {
+            self.is_waiting[block.get()] = true;
             self.waiting.push_back(block);
         }
     }
 
-    /// Lists the blocks whose turn it is.
+    /// Lists the blocks whose turn it is, at most so many.
     fn take(&mut self, most: usize) {
         self.list.clear();
         let count = most.min(self.waiting.len());
         for block in self.waiting.drain(..count) {
-            self.is_waiting[block as usize] = false;
+            self.is_waiting[block.get()] = false;
             self.list.push(block);
         }
         self.list.sort_unstable();
     }
-}
 
-impl Frame {
-    /// Brings direct light up to date.
-    pub(super) fn update_direct<V: Visibility>(
-        &mut self,
-        scene: &Scene,
-        visibility: &V,
-        bounces: Bounces,
-    ) {
-        let stage = &mut self.lights;
+    /// Finds the blocks whose direct light may have changed since the frame before.
+    fn find_changes<V: Visibility>(&mut self, job: &DirectJob<'_, V>, schedule: &Schedule) {
+        let visibility = job.shadows.visibility;
         let source = if visibility.is_by_openings() {
             Source::Openings
         } else {
             Source::CallersRays
         };
         let version = visibility.version();
-        let same_source = stage.source == source;
+        let same_source = self.source == source;
         let same_shadows = same_source
             && version.is_some()
-            && version == stage.version
-            && stage.doors == self.doors;
-        let by_beams = source == Source::Openings;
+            && version == self.version
+            && self.doors == job.shadows.doors;
         if !same_source {
             // Wherever there is light of another kind.
-            stage.beams_of.clear();
-            for k in 0..self.blocks.alive.len() {
-                let block = self.blocks.alive[k];
-                if self.blocks.state[block as usize].has_fresh {
-                    stage.wait_for(block);
+            self.beams_of.clear();
+            for &block in &schedule.alive {
+                if schedule.state[block.get()].has_fresh() {
+                    self.wait_for(block);
                 }
             }
         }
-        if !same_shadows || stage.next != stage.now {
-            if by_beams {
-                stage.trace(scene, &self.doors, same_shadows);
+        if !same_shadows || job.lights != self.now {
+            if source == Source::Openings {
+                self.trace(job.scene, job.lights, job.shadows.doors, same_shadows);
             } else {
-                for block in 0..scene.blocks.len() as u32 {
-                    stage.wait_for(block);
+                for block in job.scene.layout.ranks() {
+                    self.wait_for(block);
                 }
             }
         }
-        (stage.source, stage.version) = (source, version);
-        stage.doors.copy_from_slice(&self.doors);
-        stage.now.clear();
-        stage.now.extend_from_slice(&stage.next);
-        let most = match (self.config.slice, bounces) {
-            (Some(slice), Bounces::Count(1) | Bounces::Feedback) => slice.get(),
-            _ => usize::MAX,
-        };
-        stage.take(most);
-        self.work = FrameWork {
-            direct: stage.list.len(),
-            ..FrameWork::default()
-        };
-        if by_beams && !stage.overflow {
-            stage.find_hits(scene);
+        (self.source, self.version) = (source, version);
+        self.doors.copy_from_slice(job.shadows.doors);
+        self.now.clear();
+        self.now.extend_from_slice(job.lights);
+    }
+
+    /// Brings direct light up to date, for `job.most` blocks at most. Returns how many blocks were computed.
+    pub(super) fn update<V: Visibility>(
+        &mut self,
+        job: &DirectJob<'_, V>,
+        direct: &mut Planes,
+        schedule: &mut Schedule,
+    ) -> usize {
+        self.find_changes(job, schedule);
+        self.take(job.most);
+        let by_beams = self.source == Source::Openings && !self.overflow;
+        if by_beams {
+            self.find_hits(job.scene);
         }
-        let by_beams = by_beams && !stage.overflow;
-        let level = self.config.simd;
-        let executor = &*self.config.executor;
-        let tasks = task_count(executor, stage.list.len()).min(stage.scratch.len());
-        let mut planes = CutPlanes::new(&mut self.direct);
-        let mut found = &mut stage.found[..];
+        self.compute(job, by_beams, direct);
+        for &block in &self.list {
+            let found = self.found[block.get()];
+            schedule.state[block.get()].has_direct = found.peak > 0.0;
+            if found.change > 0.0 {
+                schedule.touch(block, found.change);
+            }
+        }
+        self.list.len()
+    }
+
+    /// Computes direct light of the listed blocks.
+    fn compute<V: Visibility>(
+        &mut self,
+        job: &DirectJob<'_, V>,
+        by_beams: bool,
+        direct: &mut Planes,
+    ) {
+        let executor = &*job.config.executor;
+        let tasks = task_count(executor, self.list.len()).min(self.scratch.len());
+        let mut planes = CutPlanes::new(direct);
+        let mut found = &mut self.found[..];
         let mut gone = 0;
-        let mut scratch = stage.scratch.iter_mut();
-        let (list, lights, doors) = (&stage.list, &stage.now, &self.doors);
-        let (beams, hits) = (&stage.beams, &stage.hits);
-        let layout = &scene.layout;
+        let mut scratch = self.scratch.iter_mut();
+        let layout = &job.scene.layout;
+        let list = &self.list;
+        let beams = LitBlocks {
+            lights: &self.now,
+            beams: &self.beams,
+            hits: &self.hits,
+        };
         let parts = (0..tasks)
             .map_while(|k| part_of(list, tasks, k).filter(|list| !list.is_empty()))
             .filter_map(|list| {
                 let span = span(list);
-                let slots = layout.slots[span.start].start..layout.slots[span.end - 1].end;
+                let slots = layout.slots_of_span(&span);
                 let (_, rest) = std::mem::take(&mut found).split_at_mut(span.start - gone);
                 let (taken, rest) = rest.split_at_mut(span.len());
                 (found, gone) = (rest, span.end);
@@ -299,94 +312,102 @@ impl Frame {
             let span = span(list);
             let first_slot = layout.slots[span.start].start;
             for &block in list {
-                let place = block as usize;
-                let slots = layout.slots[place].clone();
+                let slots = layout.slots(block);
                 let count = slots.len();
                 let new = &mut scratch[..3 * count];
                 if by_beams {
-                    let start = hits.partition_point(|hit| hit.0 < block);
-                    let end = start + hits[start..].partition_point(|hit| hit.0 == block);
-                    let hits = &hits[start..end];
-                    by_beam(scene, place, level, lights, doors, (beams, hits), new);
+                    beams.light_block(job, block, new);
                 } else {
-                    by_asking(scene, place, lights, doors, visibility, new);
+                    ask_for_block(job, block, beams.lights, new);
                 }
                 let slots = slots.start - first_slot..slots.end - first_slot;
                 let mut result = Found::default();
                 for (plane, new) in planes.iter_mut().zip(new.chunks_exact(count)) {
                     let old = &mut plane[slots.clone()];
-                    let channel = level.run(Replace { old, new });
+                    let channel = job.config.simd.run(Replace { old, new });
                     result.change = result.change.max(channel.change);
                     result.peak = result.peak.max(channel.peak);
                 }
-                found[place - span.start] = result;
+                found[block.get() - span.start] = result;
             }
         });
-        for &block in &stage.list {
-            let found = stage.found[block as usize];
-            let emits = scene.surface.emitting.binary_search(&block).is_ok();
-            self.blocks.state[block as usize].has_fresh = emits || found.peak > 0.0;
-            if found.change > 0.0 {
-                self.blocks.touch(block, found.change);
-            }
-        }
     }
 
     /// Takes direct light that the caller computed, in the order of texels.
-    pub(super) fn take_direct(&mut self, scene: &Scene, direct: &[f32]) {
+    pub(super) fn take_from_caller(
+        &mut self,
+        scene: &SceneData,
+        values: &[f32],
+        direct: &mut Planes,
+        schedule: &mut Schedule,
+    ) {
         let mut start = 0;
-        for &place in &scene.layout.rank {
-            let place = place as usize;
-            let shape = &scene.shapes[scene.layout.shapes[place] as usize];
-            let count = shape.folding.slot_of_texel.len();
-            let values = &direct[start..start + 3 * count];
+        for &rank in &scene.layout.rank {
+            let texel_of_slot = &scene.layout.texel_of_slot[scene.layout.shape(rank)];
+            let count = scene.layout.slot_of_texel[scene.layout.shape(rank)].len();
+            let values = &values[start..start + 3 * count];
             start += 3 * count;
             let mut found = Found::default();
-            let planes = self.direct.block_mut(scene.layout.slots[place].clone());
+            let planes = direct.block_mut(scene.layout.slots(rank));
             for (plane, values) in planes.into_iter().zip(values.chunks_exact(count.max(1))) {
-                for (slot, &texel) in plane.iter_mut().zip(&shape.folding.texel_of_slot) {
+                for (slot, &texel) in plane.iter_mut().zip(texel_of_slot) {
                     let new = values.get(texel as usize).copied().unwrap_or(0.0);
                     found.change = found.change.max((new - *slot).abs());
                     found.peak = found.peak.max(new);
                     *slot = new;
                 }
             }
-            let block = place as u32;
-            let emits = scene.surface.emitting.binary_search(&block).is_ok();
-            self.blocks.state[place].has_fresh = emits || found.peak > 0.0;
+            schedule.state[rank.get()].has_direct = found.peak > 0.0;
             if found.change > 0.0 {
-                self.blocks.touch(block, found.change);
+                schedule.touch(rank, found.change);
             }
         }
-        self.lights.restart(scene);
-        self.lights.source = Source::Caller;
+        self.forget();
+        self.waiting.clear();
+        self.is_waiting.fill(false);
+        self.source = Source::Caller;
+    }
+}
+
+/// What direct light of a frame depends on.
+pub(super) struct DirectJob<'a, V> {
+    pub scene: &'a SceneData,
+    pub config: &'a FrameConfig,
+    pub shadows: Shadows<'a, V>,
+    pub lights: &'a [PlacedLight],
+    /// Blocks to compute, at most.
+    pub most: usize,
+}
+
+/// Texels of a block.
+fn texels_of(scene: &SceneData, block: BlockRank) -> TexelPlanes<'_> {
+    let slots = scene.layout.slots(block);
+    TexelPlanes {
+        positions: scene.texels.positions.block(slots.clone()),
+        normals: scene.texels.normals.block(slots),
     }
 }
 
 /// Direct light of one block, each texel and light asked for by itself.
-fn by_asking<V: Visibility>(
-    scene: &Scene,
-    place: usize,
+fn ask_for_block<V: Visibility>(
+    job: &DirectJob<'_, V>,
+    block: BlockRank,
     lights: &[PlacedLight],
-    doors: &[f32],
-    visibility: &V,
     out: &mut [f32],
 ) {
-    let slots = scene.layout.slots[place].clone();
+    let slots = job.scene.layout.slots(block);
     let count = slots.len();
-    let block = scene.layout.order[place] as usize;
-    let surface = &scene.surface;
+    let geometry = &job.scene.texels;
     for slot in 0..count {
-        let normal = surface.normals.get(slots.start + slot);
+        let normal = geometry.normals.get(slots.start + slot);
         let mut sum = Vec3::ZERO;
         if normal != Vec3::ZERO {
             let receiver = Receiver {
-                block,
-                position: surface.positions.get(slots.start + slot).as_dvec3(),
+                block: job.scene.layout.order[block.get()],
+                position: geometry.positions.get(slots.start + slot).as_dvec3(),
             };
             for light in lights {
-                let normal = normal.as_dvec3();
-                sum += irradiance(scene, light, doors, receiver, normal, visibility);
+                sum += irradiance(job.shadows, light, receiver, normal.as_dvec3());
             }
         }
         for (channel, x) in sum.to_array().into_iter().enumerate() {
@@ -395,34 +416,50 @@ fn by_asking<V: Visibility>(
     }
 }
 
-/// Direct light of one block, beam by beam.
-fn by_beam(
-    scene: &Scene,
-    place: usize,
-    level: SimdLevel,
-    lights: &[PlacedLight],
-    doors: &[f32],
-    (beams, hits): (&[Beam], &[(u32, u32)]),
-    out: &mut [f32],
-) {
-    out.fill(0.0);
-    let slots = scene.layout.slots[place].clone();
-    let texels = TexelPlanes {
-        positions: scene.surface.positions.block(slots.clone()),
-        normals: scene.surface.normals.block(slots.clone()),
-    };
-    let (red, rest) = out.split_at_mut(slots.len());
-    let (green, blue) = rest.split_at_mut(slots.len());
-    let beam = |hit: &(u32, u32)| &beams[hit.1 as usize];
-    for of_light in hits.chunk_by(|a, b| beam(a).light == beam(b).light) {
-        let light = &lights[beam(&of_light[0]).light as usize];
-        // An exact beam stands for all of its light's.
-        if of_light.iter().any(|hit| beam(hit).exact) {
-            add_exact(scene, place, light, doors, [red, green, blue]);
-            continue;
-        }
-        for hit in of_light {
-            add_beam(level, &texels, light, beam(hit), [red, green, blue]);
+/// Beams, and which of them light which block.
+struct LitBlocks<'a> {
+    lights: &'a [PlacedLight],
+    beams: &'a [Beam],
+    /// (block, beam), ascending.
+    hits: &'a [(BlockRank, u32)],
+}
+
+impl LitBlocks<'_> {
+    /// Direct light of one block, beam by beam.
+    fn light_block<V: Visibility>(
+        &self,
+        job: &DirectJob<'_, V>,
+        block: BlockRank,
+        out: &mut [f32],
+    ) {
+        out.fill(0.0);
+        let hits = self.hits;
+        let start = hits.partition_point(|hit| hit.0 < block);
+        let end = start + hits[start..].partition_point(|hit| hit.0 == block);
+        let texels = texels_of(job.scene, block);
+        let count = texels.normals[0].len();
+        let (red, rest) = out.split_at_mut(count);
+        let (green, blue) = rest.split_at_mut(count);
+        let beam = |hit: &(BlockRank, u32)| &self.beams[hit.1 as usize];
+        let simd: SimdLevel = job.config.simd;
+        for of_light in hits[start..end].chunk_by(|a, b| beam(a).light == beam(b).light) {
+            let light = &self.lights[beam(&of_light[0]).light as usize];
+            let mut out = [&mut *red, &mut *green, &mut *blue];
+            // An exact beam stands for all of its light's.
+            if of_light.iter().any(|hit| beam(hit).exact) {
+                let shadows = Shadows {
+                    level: job.shadows.level,
+                    doors: job.shadows.doors,
+                    visibility: &Openings,
+                };
+                let index = job.scene.layout.order[block.get()];
+                add_exact(shadows, index, &texels, light, out);
+                continue;
+            }
+            for hit in of_light {
+                let out = out.each_mut().map(|channel| &mut **channel);
+                add_beam(simd, &texels, light, beam(hit), out);
+            }
         }
     }
 }

@@ -1,16 +1,21 @@
 //! The stages of a pass over lists of blocks, one kernel a task: small blocks have little more to compute than a call of
 //! a kernel costs.
 
-use super::blocks::BlockState;
-use super::kernels::{ChangeOf, CoefficientsOf, IndirectOf, ResponsesOf, Scratch, Sent};
-use crate::modular::scene::{Planes, Scene};
-use mrt_core::simd::tiles::CHANNELS;
+use crate::modular::frame::schedule::BlockState;
+use crate::modular::frame::surface::Surface;
+use crate::modular::kernels::coefficients::{CoefficientsOf, Sent};
+use crate::modular::kernels::indirect::IndirectOf;
+use crate::modular::kernels::responses::{ChangeOf, ResponsesOf};
+use crate::modular::kernels::scratch::Scratch;
+use crate::modular::scene::SceneData;
+use crate::output::texel_layout::{BlockRank, Planes};
 use mrt_core::simd::{Kernel, Lanes};
 
 /// Coefficients b of a list of blocks, one task: its slices hold everything between the first block and the last.
 pub(super) struct Senders<'a> {
-    pub scene: &'a Scene,
-    pub list: &'a [u32],
+    pub scene: &'a SceneData,
+    pub surface: &'a Surface,
+    pub list: &'a [BlockRank],
     pub first: usize,
     pub direct: &'a Planes,
     /// None where it is not reflected.
@@ -26,25 +31,25 @@ impl Kernel for Senders<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {
-        let layout = &*self.scene.layout;
-        let surface = &self.scene.surface;
-        let size = CHANNELS * layout.rows;
+        let layout = &self.scene.layout;
+        let surface = self.surface;
+        let size = self.scene.rows.per_block();
         for &block in self.list {
-            let place = block as usize;
+            let place = block.get();
             let at = place - self.first;
             let coefficients = &mut self.coefficients[at * size..(at + 1) * size];
             let state = &mut self.state[at];
             let indirect = self.indirect.filter(|_| state.has_indirect);
-            if !state.has_fresh && indirect.is_none() {
+            if !state.has_fresh() && indirect.is_none() {
                 coefficients.fill(0.0);
                 self.flags[at] = false;
                 (state.sent, state.fresh) = ([0.0; 3], [0.0; 3]);
                 continue;
             }
             let slots = &layout.slots[place];
-            let emits = surface.emitting.binary_search(&block).is_ok();
+            let emits = state.emits;
             let kernel = CoefficientsOf {
-                shape: &self.scene.shapes[layout.shapes[place] as usize],
+                shape: &self.scene.shapes[layout.shape(block)],
                 direct: self.direct.block(slots.clone()),
                 indirect: indirect.map(|indirect| indirect.block(slots.clone())),
                 albedo: surface.albedo.block(slots.clone()),
@@ -62,8 +67,8 @@ impl Kernel for Senders<'_> {
 
 /// Joint coefficients of a list of blocks, one task.
 pub(super) struct Receivers<'a> {
-    pub scene: &'a Scene,
-    pub list: &'a [u32],
+    pub scene: &'a SceneData,
+    pub list: &'a [BlockRank],
     pub first: usize,
     pub coefficients: &'a [f32],
     pub has_coefficients: &'a [bool],
@@ -80,12 +85,12 @@ impl Kernel for Receivers<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) {
-        let layout = &*self.scene.layout;
-        let size = CHANNELS * layout.rows;
+        let layout = &self.scene.layout;
+        let size = self.scene.rows.per_block();
         for &block in self.list {
-            let place = block as usize;
+            let place = block.get();
             let at = place - self.first;
-            let shape = &self.scene.shapes[layout.shapes[place] as usize];
+            let shape = &self.scene.shapes[layout.shape(block)];
             let kept = &mut self.joint[at * size..(at + 1) * size];
             let state = &mut self.state[at];
             let to = match self.keep_within {
@@ -93,7 +98,7 @@ impl Kernel for Receivers<'_> {
                 None => &mut *kept,
             };
             let kernel = ResponsesOf {
-                block: place,
+                block,
                 shape,
                 transport: &self.scene.transport,
                 coefficients: self.coefficients,
@@ -110,9 +115,10 @@ impl Kernel for Receivers<'_> {
             let now = &self.scratch.joint[..];
             let before = &*kept;
             let change = ChangeOf { shape, before, now }.run(l);
-            // What goes dark goes dark. Rows beyond the shape's are those of another block.
+            // Always store a block that becomes fully dark, even within tolerance. Rows beyond the shape's own are left from
+            // another block.
             let is_dark = |row: &[f32]| row[..shape.rows].iter().all(|&r| r == 0.0);
-            let goes_dark = change > 0.0 && now.chunks_exact(layout.rows).all(is_dark);
+            let goes_dark = change > 0.0 && now.chunks_exact(self.scene.rows.count).all(is_dark);
             if change <= most && !goes_dark {
                 (state.is_kept, state.lag) = (true, change);
             } else {
@@ -124,8 +130,8 @@ impl Kernel for Receivers<'_> {
 
 /// Indirect light of a list of blocks, one task.
 pub(super) struct Unfolding<'a> {
-    pub scene: &'a Scene,
-    pub list: &'a [u32],
+    pub scene: &'a SceneData,
+    pub list: &'a [BlockRank],
     pub first: usize,
     pub first_slot: usize,
     /// Joint coefficients of all blocks.
@@ -141,15 +147,15 @@ impl Kernel for Unfolding<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) {
-        let layout = &*self.scene.layout;
-        let size = CHANNELS * layout.rows;
+        let layout = &self.scene.layout;
+        let size = self.scene.rows.per_block();
         for &block in self.list {
-            let place = block as usize;
+            let place = block.get();
             let slots = &layout.slots[place];
             let slots = slots.start - self.first_slot..slots.end - self.first_slot;
             let [red, green, blue] = &mut self.planes;
             let kernel = IndirectOf {
-                shape: &self.scene.shapes[layout.shapes[place] as usize],
+                shape: &self.scene.shapes[layout.shape(block)],
                 joint: &self.joint[place * size..(place + 1) * size],
                 scratch: self.scratch,
                 compare: self.compare,

@@ -1,8 +1,9 @@
 //! The operators of one shape, folded and packed.
 
-use super::Values;
-use super::folding::{Classes, Folding};
 use crate::level::shape::Shape;
+use crate::modular::packed::folding::{Classes, Folding};
+use crate::modular::packed::numbers::PackedNumbers;
+use crate::output::probe_order::PROBE_COEFFICIENTS;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::simd::Aligned;
 use mrt_core::simd::rows::DOT_ROWS;
@@ -30,10 +31,10 @@ pub struct PackedShape {
     /// `u16::MAX` for padding.
     mode_of_row: Vec<u16>,
     /// `T_d->b`, in groups of rows of one class; each row has one number an orbit.
-    pub(crate) from_direct: Values,
+    pub(crate) from_direct: PackedNumbers,
     pub(crate) groups: Vec<Group>,
     /// The joint basis: tile after tile of orbits, in a tile one column a mode, class after class.
-    pub(crate) joint: Values,
+    pub(crate) joint: PackedNumbers,
     /// By class: the rows of its joint modes.
     pub(crate) joint_classes: Vec<Range<usize>>,
     /// What coefficients are multiplied by, by row; empty if by 1.
@@ -87,7 +88,7 @@ pub struct Group {
 pub struct Tiled {
     /// Rows before padding.
     pub rows: usize,
-    pub(crate) values: Values,
+    pub(crate) values: PackedNumbers,
     pub(crate) columns: ColumnLists,
     pub(crate) scales: Vec<f32>,
 }
@@ -102,7 +103,7 @@ impl Tiled {
     ) -> Self {
         let rows = matrix.rows();
         let scales = scales(matrix, storage);
-        let mut values = Values::new(storage);
+        let mut values = PackedNumbers::new(storage);
         for tile in (0..rows).step_by(TILE) {
             for (j, &scale) in scales.iter().enumerate() {
                 for k in tile..tile + TILE {
@@ -127,7 +128,7 @@ impl Tiled {
 }
 
 /// The matrices that a shape is packed from.
-pub(crate) struct Operators<'a> {
+pub struct Operators<'a> {
     /// `T_d->b`, modes x texels.
     pub coefficients_from_direct: &'a Matrix<f32>,
     /// Texels x joint modes.
@@ -151,7 +152,7 @@ impl PackedShape {
         let (folding, classes) = Folding::new(shape, resolution, t, j, operators.areas);
         let order = RowOrder::new(&folding, &classes.joint);
         let scales = scales(j, storage);
-        let mut joint = Values::new(storage);
+        let mut joint = PackedNumbers::new(storage);
         for tile in (0..folding.stride).step_by(TILE) {
             for rows in &order.classes {
                 for &mode in &order.mode_of_row[rows.clone()] {
@@ -317,7 +318,7 @@ fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
     (0..matrix.columns())
         .map(|j| {
             let largest = matrix.column(j).iter().fold(0.0f32, |m, x| m.max(x.abs()));
-            Values::scale(storage, largest)
+            PackedNumbers::scale(storage, largest)
         })
         .collect()
 }
@@ -331,7 +332,7 @@ fn power_of_two(x: f32) -> f32 {
 }
 
 /// SH coefficients of a probe.
-const SH_COEFFICIENTS: usize = crate::output::probes::PROBE_COEFFICIENTS;
+const SH_COEFFICIENTS: usize = PROBE_COEFFICIENTS;
 
 fn coefficient_rows(
     folding: &Folding,
@@ -339,7 +340,7 @@ fn coefficient_rows(
     order: &RowOrder,
     t: &Matrix<f32>,
     storage: Storage,
-) -> (Values, Vec<Group>) {
+) -> (PackedNumbers, Vec<Group>) {
     let rows = (0u16..).zip(&order.mode_of_row);
     let own: Vec<(u16, usize)> = rows
         .map(|(row, &mode)| (row, usize::from(mode)))
@@ -367,7 +368,7 @@ fn coefficient_rows(
         !members.windows(2).all(alike)
     };
     members.sort_by_key(|members| (are_mixed(members), members[0].0));
-    let mut numbers = Values::new(storage);
+    let mut numbers = PackedNumbers::new(storage);
     let mut groups = Vec::new();
     for members in members {
         let is_mixed = are_mixed(&members);
@@ -389,7 +390,7 @@ fn coefficient_rows(
                 .clone()
                 .filter_map(value)
                 .fold(0.0f32, |m, x| m.max(x.abs()));
-            let scale = Values::scale(storage, largest);
+            let scale = PackedNumbers::scale(storage, largest);
             for orbit in orbits {
                 numbers.push(value(orbit).unwrap_or(0.0), scale);
             }

@@ -1,14 +1,15 @@
 //! `T_b->r` by where light arrives, without what is zero or negligible.
 
-use super::{PackedShape, Values};
-use crate::modular::scene::Layout;
+use crate::modular::packed::numbers::PackedNumbers;
+use crate::modular::packed::shape::PackedShape;
+use crate::output::texel_layout::{BlockRank, TexelLayout};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::simd::tiles::ColumnLists;
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
 /// From the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are counted as frames keep them
-/// ([`Layout`](crate::modular::scene::Layout)).
+/// ([`TexelLayout`]).
 #[derive(Clone, Debug, Default)]
 pub struct PackedTransport {
     /// By block: its tiles.
@@ -19,18 +20,18 @@ pub struct PackedTransport {
     pub(crate) columns: ColumnLists,
     /// One a column, for `int8` only.
     pub(crate) column_scales: Vec<f32>,
-    pub(crate) values: Option<Values>,
+    pub(crate) values: Option<PackedNumbers>,
     /// By gate: the doors whose values multiply what passes it.
     pub(crate) gates: Vec<Vec<u32>>,
     /// Blocks that a block sends light to, itself not counted unless it does: those of block k are
     /// `reached[reached_by[k]..reached_by[k + 1]]`.
     pub(crate) reached_by: Vec<u32>,
-    pub(crate) reached: Vec<u32>,
+    pub(crate) reached: Vec<BlockRank>,
     dense_multiply_adds: usize,
     multiply_adds: usize,
 }
 
-/// What arrives in one [`RowTile`](super::RowTile) of a block.
+/// What arrives in one [`RowTile`](crate::modular::packed::shape::RowTile) of a block.
 #[derive(Clone, Debug)]
 pub struct TransportTile {
     pub(crate) entries: Range<u32>,
@@ -45,7 +46,7 @@ pub struct TransportTile {
 /// What one block sends to a tile.
 #[derive(Clone, Debug)]
 pub struct TransportEntry {
-    pub(crate) source: u32,
+    pub(crate) source: BlockRank,
     /// Which of the gates it passes; `u32::MAX` if none.
     pub(crate) gate: u32,
     /// In the lists of columns.
@@ -73,10 +74,10 @@ pub struct TransportPacker<'a> {
 
 #[derive(Clone, Debug)]
 struct Pending {
-    target: u32,
+    target: BlockRank,
     tile: u32,
     gate: u32,
-    source: u32,
+    source: BlockRank,
     columns: Range<usize>,
     start: usize,
 }
@@ -84,14 +85,15 @@ struct Pending {
 impl<'a> TransportPacker<'a> {
     pub(crate) fn new(
         shapes: &'a [PackedShape],
-        layout: &Layout,
+        layout: &TexelLayout,
+        block_stride: usize,
         storage: Storage,
         negligible: Option<f32>,
     ) -> Self {
         Self {
             shapes,
             shape_of_block: layout.shapes.iter().map(|&shape| shape as usize).collect(),
-            block_stride: 3 * layout.rows as u32,
+            block_stride: block_stride as u32,
             storage,
             negligible,
             pending: Vec::new(),
@@ -114,13 +116,13 @@ impl<'a> TransportPacker<'a> {
     pub(crate) fn add(
         &mut self,
         doors: &[u32],
-        target: usize,
-        source: usize,
+        target: BlockRank,
+        source: BlockRank,
         operator: &Matrix<f32>,
     ) {
         let (to, from) = (
-            &self.shapes[self.shape_of_block[target]],
-            &self.shapes[self.shape_of_block[source]],
+            &self.shapes[self.shape_of_block[target.get()]],
+            &self.shapes[self.shape_of_block[source.get()]],
         );
         self.dense_multiply_adds += 3 * operator.rows() * operator.columns();
         let gate = if doors.is_empty() {
@@ -178,10 +180,10 @@ impl<'a> TransportPacker<'a> {
                 self.values.extend(values);
             }
             self.pending.push(Pending {
-                target: target as u32,
+                target,
                 tile,
                 gate,
-                source: source as u32,
+                source,
                 columns: first_column..self.columns.len(),
                 start,
             });
@@ -197,7 +199,7 @@ impl<'a> TransportPacker<'a> {
             dense_multiply_adds: self.dense_multiply_adds,
             ..PackedTransport::default()
         };
-        let mut values = Values::new(self.storage);
+        let mut values = PackedNumbers::new(self.storage);
         let mut next = 0;
         for (target, &shape) in self.shape_of_block.iter().enumerate() {
             let shape = &self.shapes[shape];
@@ -208,7 +210,7 @@ impl<'a> TransportPacker<'a> {
                 let first = next;
                 while next < self.pending.len()
                     && (self.pending[next].target, self.pending[next].tile)
-                        == (target as u32, tile as u32)
+                        == (BlockRank::new(target), tile as u32)
                 {
                     next += 1;
                 }
@@ -220,7 +222,7 @@ impl<'a> TransportPacker<'a> {
                     .fold(0.0f32, |m, x| m.max(x.abs()));
                 let scale = match self.storage {
                     Storage::Int8 => 1.0,
-                    storage => Values::scale(storage, largest),
+                    storage => PackedNumbers::scale(storage, largest),
                 };
                 let first_entry = packed.entries.len() as u32;
                 for entry in entries {
@@ -228,7 +230,7 @@ impl<'a> TransportPacker<'a> {
                     for column in numbers(entry).chunks(height) {
                         let scale = if self.storage == Storage::Int8 {
                             let largest = column.iter().fold(0.0f32, |m, x| m.max(x.abs()));
-                            let scale = Values::scale(Storage::Int8, largest);
+                            let scale = PackedNumbers::scale(Storage::Int8, largest);
                             packed.column_scales.push(scale);
                             scale
                         } else {
@@ -239,7 +241,7 @@ impl<'a> TransportPacker<'a> {
                         }
                         packed.multiply_adds += 3 * height;
                     }
-                    let first = entry.source * self.block_stride;
+                    let first = entry.source.get() as u32 * self.block_stride;
                     let columns = self.columns[entry.columns.clone()].iter();
                     let columns = columns.map(|&column| first + u32::from(column));
                     let columns = packed.columns.push(columns);
@@ -256,7 +258,7 @@ impl<'a> TransportPacker<'a> {
                     // gate even.
                     let columns: usize = entries[gated..].iter().map(|p| p.columns.len()).sum();
                     if columns % 2 == 1 && self.storage != Storage::Int8 {
-                        let column = last.source * self.block_stride;
+                        let column = last.source.get() as u32 * self.block_stride;
                         let end = packed.columns.push([column]).end;
                         packed
                             .entries
@@ -281,12 +283,12 @@ impl<'a> TransportPacker<'a> {
                 .tiles_of_block
                 .push(first_tile..packed.tiles.len() as u32);
         }
-        let mut pairs: Vec<(u32, u32)> =
+        let mut pairs: Vec<(BlockRank, BlockRank)> =
             self.pending.iter().map(|p| (p.source, p.target)).collect();
         pairs.sort_unstable();
         pairs.dedup();
         let mut at = 0;
-        for source in 0..self.shape_of_block.len() as u32 {
+        for source in (0..self.shape_of_block.len()).map(BlockRank::new) {
             packed.reached_by.push(at as u32);
             while at < pairs.len() && pairs[at].0 == source {
                 packed.reached.push(pairs[at].1);
@@ -311,7 +313,7 @@ const ROUNDING: f64 = 1e-6;
 impl PackedTransport {
     /// Bytes of operators and of what says where they stand.
     pub fn bytes(&self) -> usize {
-        self.values.as_ref().map_or(0, Values::bytes)
+        self.values.as_ref().map_or(0, PackedNumbers::bytes)
             + self.columns.bytes()
             + size_of_val(self.column_scales.as_slice())
             + size_of_val(self.tiles.as_slice())
@@ -325,15 +327,15 @@ impl PackedTransport {
         [self.multiply_adds, self.dense_multiply_adds]
     }
 
-    /// The same of what is kept, where only some blocks have light: `is_lit[place]`, places as in
-    /// [`Layout::rank`](crate::modular::scene::Layout).
+    /// The same of what is kept, where only some blocks have light: `is_lit[rank]`, ranks as in
+    /// [`TexelLayout::rank`].
     ///
     /// # Panics
-    /// If there are fewer places than blocks.
+    /// If there are fewer flags than blocks.
     pub fn multiply_adds_from(&self, is_lit: &[bool]) -> usize {
         let of_tile = |tile: &TransportTile| {
             let entries = &self.entries[tile.entries.start as usize..tile.entries.end as usize];
-            let lit = entries.iter().filter(|e| is_lit[e.source as usize]);
+            let lit = entries.iter().filter(|e| is_lit[e.source.get()]);
             let columns: usize = lit.map(|entry| entry.columns.len()).sum();
             3 * columns * usize::from(tile.height)
         };
@@ -341,7 +343,8 @@ impl PackedTransport {
     }
 
     /// Blocks that a block sends light to.
-    pub(crate) fn reached(&self, block: usize) -> &[u32] {
+    pub(crate) fn reached(&self, block: BlockRank) -> &[BlockRank] {
+        let block = block.get();
         &self.reached[self.reached_by[block] as usize..self.reached_by[block + 1] as usize]
     }
 }

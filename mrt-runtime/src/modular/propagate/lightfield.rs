@@ -3,11 +3,13 @@
 //! Sequences that reach an opening with the same set of headings behind them are summed before they go on, since
 //! open rooms have binomially many.
 
-use super::transit::Transits;
-use super::{Arrivals, arrive, compose, with_door};
-use crate::modular::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::Beyond;
+use crate::modular::dictionary::{LightfieldOperators, OperatorMatrix};
 use crate::modular::path::{Roll, frame_of_heading, hole_of};
-use crate::modular::scene::{Beyond, Scene};
+use crate::modular::propagate::arrivals::{Arrivals, Arriving, arrive, compose, with_door};
+use crate::modular::propagate::context::PropagationContext;
+use crate::modular::scene::SceneData;
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::{Matrix, multiply};
@@ -24,7 +26,7 @@ struct Wave {
 /// Which waves are summed.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct WaveKey {
-    block: usize,
+    block: BlockIndex,
     entered: Face,
     /// Headings used so far, as bits of [`Face::index`] in the source's frame.
     headings: u8,
@@ -40,88 +42,110 @@ struct WaveKey {
 
 type Front = BTreeMap<WaveKey, Wave>;
 
-/// The sum of all light of a block that enters others, but for paths of up to `covered` openings, which is by the
-/// number of holes on the way (two standing for more); `fields` are the dictionary's, decoded.
-pub(super) fn follow<M: OperatorMatrix>(
-    scene: &Scene,
-    dictionary: &Dictionary<M>,
-    fields: &LightfieldOperators,
-    (used_shapes, transits): (&[&ShapeOperators<M>], &Transits),
-    source: usize,
-    max_depth: usize,
-    covered: [usize; 3],
-) -> Arrivals {
-    let block = &scene.blocks[source];
-    let emission = &used_shapes[block.shape_index].openings;
-    let mut front = Front::new();
-    for (aperture, operators) in block.shape.openings.iter().zip(emission) {
-        let sent = Sent {
-            block: source,
-            exit: aperture.face,
-            source_from_here: CubeRotation::IDENTITY,
-            frame: frame_of_heading(aperture.face),
-            headings: 0,
-            holes: 0,
-            doors: &[],
-            lightfield: multiply(
-                fields.from_emission.view(),
-                operators.emission_from_coefficients[0].decode().view(),
-            ),
-        };
-        cross(&mut front, scene, fields, sent);
-    }
-    let mut arrivals = Arrivals::new();
-    for depth in 1..=max_depth {
-        let mut next = Front::new();
-        for (key, wave) in front {
-            if depth > covered[key.holes] {
-                let responses = multiply(
-                    fields.response_from_lightfield.view(),
-                    wave.lightfield.view(),
-                );
-                let target_frame =
-                    CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame);
-                arrive(
-                    &mut arrivals,
-                    &key.doors,
-                    (key.block, key.entered),
-                    target_frame,
-                    &dictionary.paths.response_parity,
-                    (&responses, 1.0),
-                );
+/// Follows light by lightfields, but for paths that the table has.
+pub(super) struct LightfieldWalk<'a, M> {
+    pub context: &'a PropagationContext<'a, M>,
+    /// The dictionary's lightfields, decoded.
+    pub fields: &'a LightfieldOperators,
+    /// Openings of the longest paths that the table has, by the number of holes on the way (two standing for more).
+    pub covered: [usize; 3],
+}
+
+impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
+    /// The sum of all light of a block that enters others.
+    pub(super) fn follow(&self, source: BlockIndex) -> Arrivals {
+        let mut front = self.emitted(source);
+        let mut arrivals = Arrivals::new();
+        let max_depth = self.context.config.max_depth;
+        for depth in 1..=max_depth {
+            let mut next = Front::new();
+            for (key, wave) in front {
+                if depth > self.covered[key.holes] {
+                    self.enter(&mut arrivals, &key, &wave);
+                }
+                if depth < max_depth {
+                    self.pass_on(&mut next, &key, &wave);
+                }
             }
-            if depth == max_depth {
+            front = next;
+        }
+        arrivals
+    }
+
+    /// What leaves the source through its own openings.
+    fn emitted(&self, source: BlockIndex) -> Front {
+        let (scene, fields) = (self.context.scene, self.fields);
+        let openings = scene.level.blocks[source.get()].shape.openings;
+        let emission = &self.context.operators(source.get()).openings;
+        let mut front = Front::new();
+        for (aperture, operators) in openings.iter().zip(emission) {
+            let sent = Sent {
+                block: source,
+                exit: aperture.face,
+                source_from_here: CubeRotation::IDENTITY,
+                frame: frame_of_heading(aperture.face),
+                headings: 0,
+                holes: 0,
+                doors: &[],
+                lightfield: multiply(
+                    fields.from_emission.view(),
+                    operators.emission_from_coefficients[0].decode().view(),
+                ),
+            };
+            cross(&mut front, scene, fields, sent);
+        }
+        front
+    }
+
+    /// Adds what a wave becomes in the block that it enters.
+    fn enter(&self, arrivals: &mut Arrivals, key: &WaveKey, wave: &Wave) {
+        let responses = multiply(
+            self.fields.response_from_lightfield.view(),
+            wave.lightfield.view(),
+        );
+        let arriving = Arriving {
+            doors: &key.doors,
+            block: key.block,
+            face: key.entered,
+            frame: CubeSymmetry::from(wave.source_from_here.inverse()).after(key.frame),
+            parity: &self.context.dictionary.paths.response_parity,
+            responses: &responses,
+            factor: 1.0,
+        };
+        arrive(arrivals, arriving);
+    }
+
+    /// Passes a wave on through every other opening of its block that leads on and does not turn back.
+    fn pass_on(&self, next: &mut Front, key: &WaveKey, wave: &Wave) {
+        let (scene, fields) = (self.context.scene, self.fields);
+        let here = &scene.level.blocks[key.block.get()];
+        for aperture in here.shape.openings {
+            let heading = wave.source_from_here.face(aperture.face);
+            let turns_back = key.headings >> heading.opposite().index() & 1 == 1;
+            let leads_on = matches!(here.beyond[aperture.face.index()], Beyond::Block { .. });
+            if turns_back || !leads_on || aperture.face == key.entered {
                 continue;
             }
-            for aperture in scene.blocks[key.block].shape.openings {
-                let heading = wave.source_from_here.face(aperture.face);
-                let turns_back = key.headings >> heading.opposite().index() & 1 == 1;
-                let here = &scene.blocks[key.block];
-                let leads_on = matches!(here.beyond[aperture.face.index()], Beyond::Block { .. });
-                if turns_back || !leads_on || aperture.face == key.entered {
-                    continue;
-                }
-                let (frame, mut lightfield) = through(fields, key.frame, &wave.lightfield, heading);
-                let factor = transits.factor(here, key.entered, aperture.face);
-                if factor != 1.0 {
-                    lightfield.data_mut().iter_mut().for_each(|x| *x *= factor);
-                }
-                let sent = Sent {
-                    block: key.block,
-                    exit: aperture.face,
-                    source_from_here: wave.source_from_here,
-                    frame,
-                    headings: key.headings,
-                    holes: key.holes,
-                    doors: &key.doors,
-                    lightfield,
-                };
-                cross(&mut next, scene, fields, sent);
+            let (frame, mut lightfield) = through(fields, key.frame, &wave.lightfield, heading);
+            let shape = scene.blocks[key.block.get()].shape_index;
+            let transits = &self.context.transits;
+            let factor = transits.factor(shape, key.entered, aperture.face);
+            if factor != 1.0 {
+                lightfield.data_mut().iter_mut().for_each(|x| *x *= factor);
             }
+            let sent = Sent {
+                block: key.block,
+                exit: aperture.face,
+                source_from_here: wave.source_from_here,
+                frame,
+                headings: key.headings,
+                holes: key.holes,
+                doors: &key.doors,
+                lightfield,
+            };
+            cross(next, scene, fields, sent);
         }
-        front = next;
     }
-    arrivals
 }
 
 /// The lightfield at the opening of a cube towards `heading`, and its frame, from that at the opening entered.
@@ -163,7 +187,7 @@ fn change_signs(lightfield: &mut Matrix<f32>, parity: &[u8], is_odd: impl Fn(u8)
 
 /// A lightfield at an opening of a block, on its way out.
 struct Sent<'a> {
-    block: usize,
+    block: BlockIndex,
     exit: Face,
     source_from_here: CubeRotation,
     frame: CubeSymmetry,
@@ -174,8 +198,8 @@ struct Sent<'a> {
 }
 
 /// Passes a lightfield into the block beyond, if there is one.
-fn cross(front: &mut Front, scene: &Scene, fields: &LightfieldOperators, sent: Sent) {
-    let here = &scene.blocks[sent.block];
+fn cross(front: &mut Front, scene: &SceneData, fields: &LightfieldOperators, sent: Sent) {
+    let here = &scene.level.blocks[sent.block.get()];
     let Beyond::Block {
         block,
         face: entered,

@@ -4,14 +4,15 @@
 //! binomially many, which bounds the depth of a table rather than that of a level: adding one costs the additions
 //! of one small matrix.
 
-use super::transit::Transits;
-use super::{Arrivals, arrive, compose, with_door};
-use crate::modular::assemble::AssembleError;
-use crate::modular::dictionary::{Dictionary, OperatorMatrix, PathTable, ShapeOperators};
+use crate::level::block_index::BlockIndex;
+use crate::level::placed::{Beyond, PlacedBlock};
+use crate::modular::assemble::error::AssembleError;
+use crate::modular::dictionary::{OperatorMatrix, PathTable};
 use crate::modular::path::{
     Crossing, MAX_WORD, Roll, Word, frame_of_heading, hole_of, response_frame,
 };
-use crate::modular::scene::{Beyond, Scene, SceneBlock};
+use crate::modular::propagate::arrivals::{Arrivals, Arriving, arrive, compose, with_door};
+use crate::modular::propagate::context::PropagationContext;
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::{Matrix, multiply};
@@ -20,11 +21,7 @@ use std::rc::Rc;
 
 /// The operators of the paths that a scene has, brought to its sources.
 pub(super) struct Table<'a, M> {
-    scene: &'a Scene,
-    dictionary: &'a Dictionary<M>,
-    used_shapes: &'a [&'a ShapeOperators<M>],
-    transits: &'a Transits,
-    max_depth: usize,
+    context: &'a PropagationContext<'a, M>,
     /// Responses from coefficients.
     cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
 }
@@ -36,7 +33,7 @@ type CacheKey = (usize, usize, usize, bool, u8);
 #[derive(Clone)]
 struct Path {
     word: Word,
-    block: usize,
+    block: BlockIndex,
     /// The canonical face entered.
     entered: Face,
     /// Takes the entered block's canonical directions to the source's.
@@ -51,12 +48,13 @@ struct Path {
 
 /// All paths from a block whose words are in a table.
 struct Walk<'a, M> {
-    blocks: &'a [SceneBlock],
+    blocks: &'a [PlacedBlock],
     paths: &'a PathTable<M>,
-    /// What warped blocks do to light on its way; `None` where only the words matter.
-    transits: Option<&'a Transits>,
+    /// What a warped block does to light that enters by one face and leaves by another; `None` where only the words
+    /// matter.
+    transit: Option<&'a dyn Fn(BlockIndex, Face, Face) -> f32>,
     max_depth: usize,
-    source: usize,
+    source: BlockIndex,
     /// Position in the source shape's openings of the first one crossed.
     opening: usize,
 }
@@ -87,7 +85,7 @@ impl<M> Walk<'_, M> {
 
     /// The face of the source that paths leave by.
     fn first(self) -> Face {
-        self.blocks[self.source].shape.openings[self.opening].face
+        self.blocks[self.source.get()].shape.openings[self.opening].face
     }
 
     /// Goes on through a face of the block that a path has reached.
@@ -97,7 +95,7 @@ impl<M> Walk<'_, M> {
         path: &Path,
         visit: &mut impl FnMut(usize, &Path),
     ) -> Result<(), AssembleError> {
-        let here = &self.blocks[path.block];
+        let here = &self.blocks[path.block.get()];
         let Beyond::Block {
             block,
             face: entered,
@@ -127,8 +125,8 @@ impl<M> Walk<'_, M> {
         let Ok(index) = entries.binary_search_by(|entry| entry.word.cmp(&word)) else {
             return if self.paths.whole_table_has(&word) {
                 Err(AssembleError::MissingPath {
-                    block: self.source,
-                    face: self.blocks[self.source].orientation.face(first),
+                    block: self.source.get(),
+                    face: self.blocks[self.source.get()].orientation.face(first),
                     word: word.name(),
                 })
             } else {
@@ -149,14 +147,13 @@ impl<M> Walk<'_, M> {
         if next.word.crossings().len() >= self.max_depth {
             return Ok(());
         }
-        for aperture in self.blocks[block].shape.openings {
+        for aperture in self.blocks[block.get()].shape.openings {
             let heading = next.source_from_here.face(aperture.face);
             let used = [Some(first), next.x, next.y];
             if !used.contains(&Some(heading.opposite())) {
-                let there = &self.blocks[block];
                 let transit = self
-                    .transits
-                    .map_or(1.0, |t| t.factor(there, entered, aperture.face));
+                    .transit
+                    .map_or(1.0, |factor| factor(block, entered, aperture.face));
                 let onward = Path {
                     factor: next.factor * transit,
                     ..next.clone()
@@ -170,7 +167,7 @@ impl<M> Walk<'_, M> {
 
 /// Which entries of a table the paths of a level have, whatever its depth.
 pub(crate) fn used_paths<M>(
-    blocks: &[SceneBlock],
+    blocks: &[PlacedBlock],
     paths: &PathTable<M>,
 ) -> Result<Vec<bool>, AssembleError> {
     let mut used = vec![false; paths.entries.len()];
@@ -179,9 +176,9 @@ pub(crate) fn used_paths<M>(
             let walk = Walk {
                 blocks,
                 paths,
-                transits: None,
+                transit: None,
                 max_depth: MAX_WORD,
-                source,
+                source: BlockIndex::new(source),
                 opening,
             };
             walk.follow(&mut |index, _| used[index] = true)?;
@@ -191,50 +188,47 @@ pub(crate) fn used_paths<M>(
 }
 
 impl<'a, M: OperatorMatrix> Table<'a, M> {
-    pub(super) fn new(
-        scene: &'a Scene,
-        dictionary: &'a Dictionary<M>,
-        used_shapes: &'a [&'a ShapeOperators<M>],
-        transits: &'a Transits,
-        max_depth: usize,
-    ) -> Self {
+    pub(super) fn new(context: &'a PropagationContext<'a, M>) -> Self {
         Self {
-            scene,
-            dictionary,
-            used_shapes,
-            transits,
-            max_depth,
+            context,
             cache: HashMap::new(),
         }
     }
 
     /// All light of a block that enters others.
-    pub(super) fn follow(&mut self, source: usize) -> Result<Arrivals, AssembleError> {
+    pub(super) fn follow(&mut self, source: BlockIndex) -> Result<Arrivals, AssembleError> {
         let mut arrivals = Arrivals::new();
-        let openings = self.scene.blocks[source].shape.openings;
+        let context = self.context;
+        let (scene, paths) = (context.scene, &context.dictionary.paths);
+        let transit = |block: BlockIndex, entered: Face, left: Face| {
+            let shape = scene.blocks[block.get()].shape_index;
+            context.transits.factor(shape, entered, left)
+        };
+        let openings = scene.level.blocks[source.get()].shape.openings;
         for (opening, aperture) in openings.iter().enumerate() {
             let walk = Walk {
-                blocks: &self.scene.blocks,
-                paths: &self.dictionary.paths,
-                transits: Some(self.transits),
-                max_depth: self.max_depth,
+                blocks: &scene.level.blocks,
+                paths,
+                transit: Some(&transit),
+                max_depth: context.config.max_depth,
                 source,
                 opening,
             };
             walk.follow(&mut |index, path| {
                 let frame = path_frame(aperture.face, path.x, path.y);
                 let responses = self.responses(source, opening, index, frame);
-                let target_frame = CubeSymmetry::from(path.source_from_here.inverse())
-                    .after(frame)
-                    .after(response_frame(&path.word));
-                arrive(
-                    &mut arrivals,
-                    &path.doors,
-                    (path.block, path.entered),
-                    target_frame,
-                    &self.dictionary.paths.response_parity,
-                    (&responses, path.factor),
-                );
+                let arriving = Arriving {
+                    doors: &path.doors,
+                    block: path.block,
+                    face: path.entered,
+                    frame: CubeSymmetry::from(path.source_from_here.inverse())
+                        .after(frame)
+                        .after(response_frame(&path.word)),
+                    parity: &paths.response_parity,
+                    responses: &responses,
+                    factor: path.factor,
+                };
+                arrive(&mut arrivals, arriving);
             })?;
         }
         Ok(arrivals)
@@ -243,15 +237,16 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     /// The path's operator times the emission of the source's shape in the path's frame.
     fn responses(
         &mut self,
-        source: usize,
+        source: BlockIndex,
         opening: usize,
         word: usize,
         frame: CubeSymmetry,
     ) -> Rc<Matrix<f32>> {
-        let shape = self.scene.blocks[source].shape_index;
+        let shape = self.context.scene.blocks[source.get()].shape_index;
         let roll = Roll::of(frame);
         let key = (shape, opening, word, roll.exchanged, roll.mirrors);
-        let (dictionary, used) = (self.dictionary, self.used_shapes[shape]);
+        let paths = &self.context.dictionary.paths;
+        let used = self.context.used_shapes[shape];
         self.cache
             .entry(key)
             .or_insert_with(|| {
@@ -263,12 +258,10 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
                     .get(exchanged)
                     .unwrap_or(&operators.emission_from_coefficients[0])
                     .decode();
-                let parity = &dictionary.paths.emission_parity;
                 let mirrored = Matrix::from_fn(emission.rows(), emission.columns(), |i, j| {
-                    roll.sign(parity[i]) * emission[(i, j)]
+                    roll.sign(paths.emission_parity[i]) * emission[(i, j)]
                 });
-                let operator = &dictionary.paths.entries[word].response_from_emission;
-                let operator = operator.decode();
+                let operator = paths.entries[word].response_from_emission.decode();
                 Rc::new(multiply(operator.view(), mirrored.view()))
             })
             .clone()

@@ -3,9 +3,10 @@
 //!
 //! Of even light that factor is exact. How light spreads over the next opening stays that of the cube.
 
+use crate::level::placed::PlacedBlock;
 use crate::level::shape::Aperture;
 use crate::modular::dictionary::{Dictionary, ShapeOperators};
-use crate::modular::scene::{Scene, SceneBlock};
+use crate::modular::scene::SceneData;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
@@ -16,11 +17,11 @@ type Factors = [[f32; 6]; 6];
 
 /// Factors of the blocks whose operators were made for their warp; blocks with canonical operators pass light on
 /// as cubes.
-pub(super) struct Transits(Vec<Option<Factors>>);
+pub(crate) struct Transits(Vec<Option<Factors>>);
 
 impl Transits {
     pub(super) fn new<M>(
-        scene: &Scene,
+        scene: &SceneData,
         dictionary: &Dictionary<M>,
         used_shapes: &[&ShapeOperators<M>],
     ) -> Self {
@@ -29,21 +30,22 @@ impl Transits {
             shapes.any(|shape| std::ptr::eq(shape, *entry))
         };
         let factors = used_shapes.iter().enumerate().map(|(index, entry)| {
-            let block = scene.blocks.iter().find(|b| b.shape_index == index);
-            block.filter(|_| !is_canonical(entry)).map(factors)
+            let block = scene.blocks.iter().position(|b| b.shape_index == index);
+            let block = block.filter(|_| !is_canonical(entry));
+            block.map(|block| factors(&scene.level.blocks[block]))
         });
         Self(factors.collect())
     }
 
-    /// What light that entered through one face and leaves through another is to be multiplied by.
-    pub(super) fn factor(&self, block: &SceneBlock, entered: Face, left: Face) -> f32 {
-        self.0[block.shape_index]
+    /// What light that entered a block of a shape through one face and leaves through another is multiplied by.
+    pub(super) fn factor(&self, shape_index: usize, entered: Face, left: Face) -> f32 {
+        self.0[shape_index]
             .as_ref()
             .map_or(1.0, |factors| factors[entered.index()][left.index()])
     }
 }
 
-fn factors(block: &SceneBlock) -> Factors {
+fn factors(block: &PlacedBlock) -> Factors {
     let cube = Hexahedron::cell(DVec3::ZERO);
     let mut factors = [[1.0; 6]; 6];
     for entered in block.shape.openings {

@@ -3,15 +3,12 @@
 use glam::Vec3;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::assemble::{AssembleConfig, assemble};
-use mrt_runtime::modular::dictionary::Dictionary;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::blocks::maze;
+use mrt_runtime::{
+    AssembleConfig, Bounces, Dictionary, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder,
+    Scene,
+};
+use mrt_tests::FrameForTests;
 use mrt_tests::sequences::{
     STORAGES, mobile_dictionary, outputs, random_level, random_lights, stored, vector_dictionary,
 };
@@ -29,7 +26,7 @@ fn frame_of(scene: &Scene, simd: SimdLevel) -> Frame {
         simd,
         ..FrameConfig::default()
     };
-    Frame::with_config(scene, config)
+    Frame::new(scene, config)
 }
 
 /// Lanes add up in another order: a few roundings of `f32`, of the largest number. Measured: 8e-7 at
@@ -57,12 +54,10 @@ fn compare_levels(dictionary: &Dictionary, blocks: usize, seeds: u64) {
             let lights: Vec<Light> = random_lights(&mut random, &level, &scene, 5);
             for bounces in [Bounces::Count(1), Bounces::Count(12)] {
                 let mut scalar = frame_of(&scene, SimdLevel::Scalar);
-                let solved = scalar.solve(&scene, &lights, &Openings, bounces);
-                assert_eq!(solved, Ok(()));
+                scalar.light_with(&lights, bounces);
                 for simd in SimdLevel::available().filter(|&l| l != SimdLevel::Scalar) {
                     let mut frame = frame_of(&scene, simd);
-                    let solved = frame.solve(&scene, &lights, &Openings, bounces);
-                    assert_eq!(solved, Ok(()));
+                    frame.light_with(&lights, bounces);
                     let apart = apart(&frame, &scalar);
                     for (worst, &(name, apart)) in worst.iter_mut().zip(&apart) {
                         *worst = (name, worst.1.max(apart));
@@ -115,7 +110,7 @@ fn stored_operators_err_as_stated() {
             negligible: Some(negligible),
             ..AssembleConfig::default()
         };
-        let scene = assemble(&level, default_dictionary(), &config).expect("the level fits");
+        let scene = Scene::assemble(&level, default_dictionary(), &config).expect("the level fits");
         let mut random = Random(2);
         let lights: Vec<Light> = (0..4)
             .map(|_| {
@@ -123,9 +118,8 @@ fn stored_operators_err_as_stated() {
                 mrt_tests::sphere(position, 0.1, Vec3::new(1.0, 0.5, 0.25))
             })
             .collect();
-        let mut frame = Frame::new(&scene);
-        let solved = frame.solve(&scene, &lights, &Openings, bounces);
-        assert_eq!(solved, Ok(()));
+        let mut frame = Frame::new(&scene, FrameConfig::default());
+        frame.light_with(&lights, bounces);
         by_texel(&scene, &frame.indirect())
     };
     for bounces in [Bounces::Count(1), Bounces::Count(10)] {
@@ -161,7 +155,8 @@ fn mirrors_that_would_fold_padding_are_left_out() {
         (mobile_dictionary(), 2, 4 * 48),
         (vector_dictionary(), 2, 4 * 32),
     ] {
-        let scene = assemble(&level, dictionary, &AssembleConfig::default()).expect("it fits");
+        let scene =
+            Scene::assemble(&level, dictionary, &AssembleConfig::default()).expect("it fits");
         let folding = &scene.shapes[scene.blocks[1].shape_index].folding;
         assert_eq!((folding.mirrors, folding.slots()), (mirrors, slots));
         // Tiles of T_b->r need it.

@@ -1,14 +1,10 @@
 //! Frames cut into parts, by slices, threads or the order of blocks, show the same light.
 
 use glam::Vec3;
+use mrt_runtime::blocks::{Block, maze};
 use mrt_runtime::executor::Executor;
-use mrt_runtime::level::block::{Block, Level};
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::Openings;
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::{Bounces, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::sequences::{difference, mobile, random_level, random_lights, random_position};
 use mrt_tests::{Random, by_texel, floor_plan, largest_difference, sphere};
 use std::num::NonZero;
@@ -25,13 +21,7 @@ fn sliced(scene: &Scene, slice: usize) -> Frame {
         slice: NonZero::new(slice),
         ..FrameConfig::default()
     };
-    Frame::with_config(scene, config)
-}
-
-fn solve(frame: &mut Frame, scene: &Scene, lights: &[Light], bounces: Bounces) {
-    frame
-        .solve(scene, lights, &Openings, bounces)
-        .expect("sound lights");
+    Frame::new(scene, config)
 }
 
 /// Moving lamps of about a watt, so that no channel needs to be scaled down.
@@ -57,19 +47,22 @@ fn slices_show_the_same_light_in_the_end() {
             // Whatever was before.
             for _ in 0..random.below(6) {
                 let lights = [lamp(&mut random, &level), lamp(&mut random, &level)];
-                solve(&mut frame, &scene, &lights, Bounces::Count(1));
+                frame.light_with(&lights, Bounces::Count(1));
             }
             let lights = [lamp(&mut random, &level)];
-            let mut expected = Frame::new(&scene);
-            solve(&mut expected, &scene, &lights, Bounces::Count(1));
+            let mut expected = Frame::new(&scene, FrameConfig::default());
+            expected.light_with(&lights, Bounces::Count(1));
             let mut needed = 0;
             let mut frames = 0;
             let mut limited = 0;
             while frames < 3 * blocks.div_ceil(slice) {
-                solve(&mut frame, &scene, &lights, Bounces::Count(1));
-                assert!(frame.work().targets <= slice && frame.work().direct <= slice);
+                frame.light_with(&lights, Bounces::Count(1));
+                assert!(
+                    frame.last_report().work().targets <= slice
+                        && frame.last_report().work().direct <= slice
+                );
                 frames += 1;
-                limited += usize::from(frame.work().limited > 0);
+                limited += usize::from(frame.last_report().work().limited > 0);
                 if difference(&frame, &expected).is_some() {
                     needed = frames + 1;
                 }
@@ -96,7 +89,7 @@ fn no_block_waits_longer_than_stated() {
         let stated = blocks.div_ceil(slice);
         let mut random = Random(blocks as u64);
         let mut frame = sliced(&scene, slice);
-        let mut unsliced = Frame::new(&scene);
+        let mut unsliced = Frame::new(&scene, FrameConfig::default());
         let mut history: Vec<Vec<f32>> = Vec::new();
         let mut oldest = 0;
         for step in 0..120 {
@@ -104,12 +97,11 @@ fn no_block_waits_longer_than_stated() {
             let light = |_| 1.0 + 0.05 * random.unit() as f32;
             let direct: Vec<f32> = (0..3 * scene.texel_count()).map(light).collect();
             for frame in [&mut frame, &mut unsliced] {
-                let solved = frame.solve_from_direct(&scene, &direct, Bounces::Count(1));
-                assert_eq!(solved, Ok(()));
+                frame.light_from(&direct, Bounces::Count(1));
             }
             history.push(unsliced.indirect());
             let shown = frame.indirect();
-            for block in &scene.blocks {
+            for block in &scene.level.blocks {
                 let range = 3 * block.texels.start..3 * block.texels.end;
                 let shown = &shown[range.clone()];
                 let age = (0..history.len())
@@ -134,11 +126,11 @@ fn in_slices_light_that_stands_still_is_not_dimmed() {
     let scene = mobile(&floor_plan(&cells, 0.5));
     let lamp = |x: f32| sphere(Vec3::new(x, 0.5, 0.5), 0.3, Vec3::ONE);
     let mut frame = sliced(&scene, 4);
-    let of_first = 0..3 * scene.blocks[0].texels.end;
+    let of_first = 0..3 * scene.level.blocks[0].texels.end;
     let mut still = None;
     for step in 0..60 {
         let x = if step < 30 { 20.5 } else { 26.5 };
-        solve(&mut frame, &scene, &[lamp(0.5), lamp(x)], Bounces::Count(1));
+        frame.light_with(&[lamp(0.5), lamp(x)], Bounces::Count(1));
         let now = frame.indirect()[of_first.clone()].to_vec();
         if step == 29 {
             still = Some(now);
@@ -165,15 +157,15 @@ fn feedback_in_slices_converges_to_the_same_light() {
         let level = maze(blocks, Vec3::splat(0.6), 11);
         let scene = mobile(&level);
         let lights = [lamp(&mut Random(4), &level)];
-        let mut expected = Frame::new(&scene);
+        let mut expected = Frame::new(&scene, FrameConfig::default());
         let limit = 200;
         for _ in 0..limit {
-            solve(&mut expected, &scene, &lights, Bounces::Feedback);
+            expected.light_with(&lights, Bounces::Feedback);
         }
         let mut frame = sliced(&scene, slice);
         for _ in 0..limit * blocks.div_ceil(slice) {
-            solve(&mut frame, &scene, &lights, Bounces::Feedback);
-            assert!(frame.work().targets <= slice);
+            frame.light_with(&lights, Bounces::Feedback);
+            assert!(frame.last_report().work().targets <= slice);
         }
         let apart = largest_difference(
             &by_texel(&scene, &frame.indirect()),
@@ -235,10 +227,16 @@ fn threads_change_no_bit() {
             executor: executor.clone(),
             ..FrameConfig::default()
         };
-        let mut serial = Frame::with_outputs(&scene, ALL_OUTPUTS);
+        let mut serial = Frame::new(
+            &scene,
+            FrameConfig {
+                outputs: ALL_OUTPUTS,
+                ..FrameConfig::default()
+            },
+        );
         let mut frames: Vec<Frame> = executors
             .iter()
-            .map(|executor| Frame::with_config(&scene, config(executor)))
+            .map(|executor| Frame::new(&scene, config(executor)))
             .collect();
         for step in 0..10 {
             let lights = random_lights(&mut random, &level, &scene, 4);
@@ -249,12 +247,12 @@ fn threads_change_no_bit() {
                 Bounces::Feedback,
                 CONVERGED,
             ][step % 5];
-            solve(&mut serial, &scene, &lights, bounces);
+            serial.light_with(&lights, bounces);
             for (frame, executor) in frames.iter_mut().zip(&executors) {
-                solve(frame, &scene, &lights, bounces);
+                frame.light_with(&lights, bounces);
                 let apart = difference(frame, &serial);
                 assert_eq!(apart, None, "seed {seed}, {bounces:?}, {executor:?}");
-                assert_eq!(frame.work(), serial.work());
+                assert_eq!(frame.last_report().work(), serial.last_report().work());
             }
         }
         for executor in &executors {
@@ -285,13 +283,13 @@ fn an_executor_that_grows_loses_no_block() {
         executor: Arc::new(Growing::default()),
         ..FrameConfig::default()
     };
-    let mut frame = Frame::with_config(&scene, config);
-    let mut serial = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, config);
+    let mut serial = Frame::new(&scene, FrameConfig::default());
     let mut random = Random(6);
     for _ in 0..10 {
         let lights: Vec<Light> = (0..5).map(|_| lamp(&mut random, &level)).collect();
         for frame in [&mut frame, &mut serial] {
-            solve(frame, &scene, &lights, Bounces::Count(2));
+            frame.light_with(&lights, Bounces::Count(2));
         }
         assert_eq!(difference(&frame, &serial), None);
     }
@@ -331,15 +329,18 @@ fn the_order_of_blocks_does_not_matter() {
         }
         let other = mobile(&reordered(&level, &order));
         for bounces in [Bounces::Count(1), Bounces::Count(20)] {
-            let mut frame = Frame::new(&scene);
-            solve(&mut frame, &scene, &lights, bounces);
-            let mut turned = Frame::new(&other);
-            solve(&mut turned, &other, &lights, bounces);
+            let mut frame = Frame::new(&scene, FrameConfig::default());
+            frame.light_with(&lights, bounces);
+            let mut turned = Frame::new(&other, FrameConfig::default());
+            turned.light_with(&lights, bounces);
             let expected = by_texel(&scene, &frame.indirect());
             let found = by_texel(&other, &turned.indirect());
             let mut in_order = vec![[0.0; 3]; found.len()];
             for (k, &block) in order.iter().enumerate() {
-                let (to, from) = (&scene.blocks[block].texels, &other.blocks[k].texels);
+                let (to, from) = (
+                    &scene.level.blocks[block].texels,
+                    &other.level.blocks[k].texels,
+                );
                 in_order[to.clone()].copy_from_slice(&found[from.clone()]);
             }
             let apart = largest_difference(&in_order, &expected);
@@ -355,8 +356,8 @@ fn a_slice_of_one_block_is_a_whole_frame() {
     let scene = mobile(&floor_plan(&[[0, 0]], 0.5));
     let mut frame = sliced(&scene, 1);
     let lights = [sphere(Vec3::splat(0.4), 0.1, Vec3::ONE)];
-    solve(&mut frame, &scene, &lights, Bounces::Count(1));
-    let mut expected = Frame::new(&scene);
-    solve(&mut expected, &scene, &lights, Bounces::Count(1));
+    frame.light_with(&lights, Bounces::Count(1));
+    let mut expected = Frame::new(&scene, FrameConfig::default());
+    expected.light_with(&lights, Bounces::Count(1));
     assert_eq!(difference(&frame, &expected), None);
 }

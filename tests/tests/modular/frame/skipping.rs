@@ -2,18 +2,18 @@
 
 use allocation_counter::measure;
 use glam::{DVec3, Vec3};
-use mrt_runtime::level::block::Level;
-use mrt_runtime::level::maze::maze;
-use mrt_runtime::light::placed::Light;
-use mrt_runtime::light::visibility::{Openings, Rays, Versioned};
-use mrt_runtime::modular::frame::{Bounces, Frame, FrameConfig, FrameError, Outputs};
-use mrt_runtime::modular::scene::Scene;
-use mrt_runtime::output::probes::ProbeOrder;
+use mrt_runtime::BlockIndex;
+use mrt_runtime::FrameReport;
+use mrt_runtime::LightError;
+use mrt_runtime::blocks::maze;
+use mrt_runtime::shadows::{Openings, Rays, Versioned};
+use mrt_runtime::{Bounces, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::sequences::{
     STORAGES, difference, furnish, mobile, mobile_dictionary, random_albedo, random_level,
     random_lights, stored, vector_dictionary,
 };
-use mrt_tests::{Random, assembled, default_dictionary, floor_plan, sphere};
+use mrt_tests::{Random, default_dictionary, floor_plan, sphere};
 
 /// All that a frame can compute.
 const OUTPUTS: Outputs = Outputs {
@@ -34,8 +34,8 @@ enum Solve {
     VersionedOpenings,
     /// Direct light that is even in one block.
     FromDirect(usize),
-    /// A light is faulty.
-    Refused,
+    /// One more light has no direction, and is skipped.
+    Faulty,
 }
 
 /// A game, as far as frames see it.
@@ -45,17 +45,40 @@ struct Game {
     scene: Scene,
     lights: Vec<Light>,
     doors: Vec<f32>,
+    /// All changes so far, for frames that are new.
+    changes: Vec<Change>,
     bounces: Bounces,
     solve: Solve,
     version: u64,
     /// For [`Solve::FromDirect`].
     direct: Vec<f32>,
-    /// For [`Solve::Refused`].
+    /// For [`Solve::Faulty`].
     faulty: Vec<Light>,
 }
 
-/// Doors that were turned on the way.
-type Turned = Vec<(usize, f32)>;
+/// What a game changes about a frame besides lights.
+#[derive(Clone, Debug)]
+enum Change {
+    Door(usize, f32),
+    Albedo(BlockIndex, Vec<Vec3>),
+    Emission(BlockIndex, Vec<Vec3>),
+}
+
+impl Change {
+    fn apply(&self, frame: &mut Frame) {
+        match self {
+            Change::Door(door, value) => frame.set_door(*door, *value).expect("a fraction"),
+            Change::Albedo(block, colours) => {
+                let set = frame.set_texel_albedo(*block, colours);
+                set.expect("colours in range");
+            }
+            Change::Emission(block, colours) => {
+                let set = frame.set_texel_emission(*block, colours);
+                set.expect("colours in range");
+            }
+        }
+    }
+}
 
 impl Game {
     fn new(seed: u64) -> Self {
@@ -76,7 +99,8 @@ impl Game {
         };
         let scene = stored(&level, dictionary, STORAGES[(seed % 5) as usize % 3]);
         Self {
-            doors: scene.doors.clone(),
+            doors: scene.level.doors.clone(),
+            changes: Vec::new(),
             random,
             level,
             scene,
@@ -90,9 +114,9 @@ impl Game {
     }
 
     /// One change, or none.
-    fn step(&mut self) -> Turned {
+    fn step(&mut self) -> Option<Change> {
         let random = &mut self.random;
-        let mut turned = Vec::new();
+        let mut change = None;
         match random.below(20) {
             0..5 if !self.lights.is_empty() => {
                 let which = random.below(self.lights.len());
@@ -113,20 +137,19 @@ impl Game {
             8 if !self.doors.is_empty() => {
                 let door = random.below(self.doors.len());
                 self.doors[door] = [0.0, 1.0, random.unit() as f32][random.below(3)];
-                turned.push((door, self.doors[door]));
+                change = Some(Change::Door(door, self.doors[door]));
             }
             9 => {
                 let block = random.below(self.level.blocks.len());
-                let count = self.scene.blocks[block].texels.len();
+                let count = self.scene.level.blocks[block].texels.len();
                 let colours: Vec<Vec3> = (0..count).map(|_| random_albedo(random)).collect();
-                let edited = if random.below(2) == 0 {
-                    self.scene.set_texel_albedo(block, &colours)
+                let block = BlockIndex::new(block);
+                change = Some(if random.below(2) == 0 {
+                    Change::Albedo(block, colours)
                 } else {
                     let on = random.below(2) as f32;
-                    let shining: Vec<Vec3> = colours.iter().map(|c| *c * on).collect();
-                    self.scene.set_texel_emission(block, &shining)
-                };
-                edited.expect("colours in range");
+                    Change::Emission(block, colours.iter().map(|c| *c * on).collect())
+                });
             }
             10 => {
                 self.bounces = [
@@ -155,7 +178,7 @@ impl Game {
                     1 => Solve::Versioned(self.version as f64 % 3.0, self.version),
                     2 => Solve::VersionedOpenings,
                     3 => Solve::FromDirect(block),
-                    4 => Solve::Refused,
+                    4 => Solve::Faulty,
                     _ => Solve::Openings,
                 };
             }
@@ -163,7 +186,7 @@ impl Game {
             _ => {}
         }
         if let Solve::FromDirect(block) = self.solve {
-            let texels = &self.scene.blocks[block].texels;
+            let texels = &self.scene.level.blocks[block].texels;
             self.direct = vec![0.0; 3 * self.scene.texel_count()];
             self.direct[3 * texels.start..3 * texels.end].fill(1.5);
         }
@@ -172,23 +195,24 @@ impl Game {
             irradiance: Vec3::ONE,
         };
         self.faulty = self.lights.iter().copied().chain([nowhere]).collect();
-        turned
+        self.changes.extend(change.clone());
+        change
     }
 
-    fn solve(&self, frame: &mut Frame) -> Result<(), FrameError> {
-        let (scene, lights, bounces) = (&self.scene, &self.lights[..], self.bounces);
+    fn solve(&self, frame: &mut Frame) -> FrameReport {
+        let (lights, bounces) = (&self.lights[..], self.bounces);
         let left_of =
             |x: f64| Rays(move |from: DVec3, _: DVec3| if from.x < x { 1.0 } else { 0.0 });
         match self.solve {
-            Solve::Openings => frame.solve(scene, lights, &Openings, bounces),
-            Solve::Rays(x) => frame.solve(scene, lights, &left_of(x), bounces),
+            Solve::Openings => frame.light_with(lights, bounces),
+            Solve::Rays(x) => frame.light_through(lights, &left_of(x), bounces),
             Solve::Versioned(x, version) => {
                 let visibility = left_of(x);
                 let versioned = Versioned {
                     visibility,
                     version,
                 };
-                frame.solve(scene, lights, &versioned, bounces)
+                frame.light_through(lights, &versioned, bounces)
             }
             Solve::VersionedOpenings => {
                 // Versions of rays are below this one.
@@ -196,10 +220,18 @@ impl Game {
                     visibility: Openings,
                     version: u64::MAX,
                 };
-                frame.solve(scene, lights, &versioned, bounces)
+                frame.light_through(lights, &versioned, bounces)
             }
-            Solve::FromDirect(_) => frame.solve_from_direct(scene, &self.direct, bounces),
-            Solve::Refused => frame.solve(scene, &self.faulty, &Openings, bounces),
+            Solve::FromDirect(_) => frame.light_from(&self.direct, bounces),
+            Solve::Faulty => {
+                frame.set_lights(&self.faulty);
+                frame.set_bounces(bounces);
+                let report = frame.solve();
+                let skipped = report.skipped_lights();
+                assert_eq!(skipped.len(), 1);
+                assert!(matches!(skipped[0].reason, LightError::NoDirection { .. }));
+                report
+            }
         }
     }
 
@@ -208,15 +240,11 @@ impl Game {
             outputs: OUTPUTS,
             ..FrameConfig::default()
         };
-        let mut frame = Frame::with_config(&self.scene, config);
-        self.turn(&mut frame);
+        let mut frame = Frame::new(&self.scene, config);
+        self.changes
+            .iter()
+            .for_each(|change| change.apply(&mut frame));
         frame
-    }
-
-    fn turn(&self, frame: &mut Frame) {
-        for (door, &value) in self.doors.iter().enumerate() {
-            frame.set_door(door, value).expect("a door and a fraction");
-        }
     }
 }
 
@@ -232,38 +260,38 @@ fn frames_that_skip_show_what_frames_show_that_compute_everything() {
         let mut frame = game.frame();
         let mut forgetful = game.frame();
         for step in 0..FRAMES {
-            let turned = game.step();
-            for &(door, value) in &turned {
-                forgetful.set_door(door, value).expect("a fraction");
+            let change = game.step();
+            if let Some(change) = &change {
+                change.apply(&mut forgetful);
             }
             let context = || {
                 let Game { bounces, solve, .. } = &game;
                 format!("game {seed}, frame {step}, {bounces:?}, {solve:?}")
             };
             forgetful.forget();
-            let mut result = Ok(());
             let allocated = measure(|| {
-                for &(door, value) in &turned {
-                    frame.set_door(door, value).expect("a fraction");
+                if let Some(change) = &change {
+                    change.apply(&mut frame);
                 }
-                result = game.solve(&mut frame);
+                game.solve(&mut frame);
             });
             assert_eq!(allocated.count_total, 0, "{}", context());
-            assert_eq!(result, game.solve(&mut forgetful), "{}", context());
+            game.solve(&mut forgetful);
             let difference_of = difference(&frame, &forgetful);
             assert_eq!(difference_of, None, "{}", context());
-            if result.is_err() {
-                assert!(matches!(game.solve, Solve::Refused), "{}", context());
-                continue;
-            }
-            assert_eq!(frame.passes(), forgetful.passes(), "{}", context());
+            assert_eq!(
+                frame.last_report().passes(),
+                forgetful.last_report().passes(),
+                "{}",
+                context()
+            );
             if game.bounces == Bounces::Count(1) {
-                skipped[0] += frame.work().targets;
-                skipped[1] += forgetful.work().targets;
+                skipped[0] += frame.last_report().work().targets;
+                skipped[1] += forgetful.last_report().work().targets;
             }
             if game.bounces != Bounces::Feedback {
                 let mut fresh = game.frame();
-                game.solve(&mut fresh).expect("solved before");
+                game.solve(&mut fresh);
                 let difference = difference(&frame, &fresh);
                 assert_eq!(difference, None, "fresh, {}", context());
             }
@@ -283,8 +311,7 @@ fn without_bounces_probes_are_dark() {
         let lights = random_lights(&mut game.random, &game.level, &game.scene, 3);
         let mut frame = game.frame();
         for bounces in [Bounces::Count(1), Bounces::Count(0)] {
-            let solved = frame.solve(&game.scene, &lights, &Openings, bounces);
-            assert_eq!(solved, Ok(()));
+            frame.light_with(&lights, bounces);
         }
         let probes = frame.probes().expect("asked for").values();
         assert!(probes.as_flattened().iter().all(|&x| x == 0.0), "{seed}");
@@ -295,12 +322,12 @@ fn without_bounces_probes_are_dark() {
 #[test]
 fn doors_move_for_versioned_openings_too() {
     let mut level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-    level.doors.push(mrt_runtime::level::block::Door {
+    level.doors.push(mrt_runtime::blocks::Door {
         connection: 0,
         value: 1.0,
     });
     let scene = mobile(&level);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     let lamp = sphere(Vec3::new(0.3, 0.5, 0.4), 0.1, Vec3::ONE);
     let versioned = Versioned {
         visibility: Openings,
@@ -308,9 +335,8 @@ fn doors_move_for_versioned_openings_too() {
     };
     for value in [1.0, 0.0, 0.5] {
         frame.set_door(0, value).expect("a fraction");
-        let solved = frame.solve(&scene, &[lamp], &versioned, Bounces::Count(1));
-        assert_eq!(solved, Ok(()));
-        let behind: f32 = frame.direct()[3 * scene.blocks[1].texels.start..]
+        frame.light_through(&[lamp], &versioned, Bounces::Count(1));
+        let behind: f32 = frame.direct()[3 * scene.level.blocks[1].texels.start..]
             .iter()
             .sum();
         assert_eq!(behind > 0.0, value > 0.0, "{value}: {behind}");
@@ -342,9 +368,15 @@ fn light_that_hardly_changes_is_kept() {
         (Bounces::Feedback, (1.0 + ALBEDO) / (1.0 - ALBEDO)),
     ] {
         let solve = |frame: &mut Frame, lights: &[Light]| {
-            assert_eq!(frame.solve(&scene, lights, &Openings, bounces), Ok(()));
+            frame.light_with(lights, bounces);
         };
-        let mut exact = Frame::with_outputs(&scene, outputs);
+        let mut exact = Frame::new(
+            &scene,
+            FrameConfig {
+                outputs,
+                ..FrameConfig::default()
+            },
+        );
         solve(&mut exact, &lights);
         let brightest = exact.indirect().into_iter().fold(0.0, f32::max);
         let config = FrameConfig {
@@ -353,7 +385,7 @@ fn light_that_hardly_changes_is_kept() {
             ..FrameConfig::default()
         };
         let stated = config.tolerance * passed_on + 1e-6 * brightest;
-        let mut frame = Frame::with_config(&scene, config);
+        let mut frame = Frame::new(&scene, config);
         solve(&mut frame, &lights);
         let (mut targets, mut kept, mut all) = (0, 0, 0);
         for step in 0..50 {
@@ -362,13 +394,13 @@ fn light_that_hardly_changes_is_kept() {
             }
             solve(&mut frame, &lights);
             solve(&mut exact, &lights);
-            targets += frame.work().targets;
-            kept += frame.work().kept;
-            all += exact.work().targets;
+            targets += frame.last_report().work().targets;
+            kept += frame.last_report().work().kept;
+            all += exact.last_report().work().targets;
             let walls = apart(&frame.indirect(), &exact.indirect());
             let lightmap = apart(
-                frame.lightmap().as_flattened(),
-                exact.lightmap().as_flattened(),
+                frame.lightmap().pixels().as_flattened(),
+                exact.lightmap().pixels().as_flattened(),
             );
             assert!(
                 walls <= stated && lightmap <= stated,
@@ -406,7 +438,7 @@ fn more_beams_than_there_is_room_for_come_and_go() {
     let scene = mobile(&level);
     let mut random = Random(9);
     let all = random_lights(&mut random, &level, &scene, 700);
-    let mut frame = Frame::new(&scene);
+    let mut frame = Frame::new(&scene, FrameConfig::default());
     for step in 0..24 {
         // Up and down through the limit, with lights moved among those that stay.
         let count = [all.len(), 300, 3, 0][step % 4];
@@ -416,50 +448,12 @@ fn more_beams_than_there_is_room_for_come_and_go() {
             lights.splice(which..=which, random_lights(&mut random, &level, &scene, 1));
         }
         let allocated = measure(|| {
-            let solved = frame.solve(&scene, &lights, &Openings, Bounces::Count(1));
-            assert_eq!(solved, Ok(()));
+            frame.light_with(&lights, Bounces::Count(1));
         });
         assert_eq!(allocated.count_total, 0, "frame {step}");
-        let mut fresh = Frame::new(&scene);
-        let solved = fresh.solve(&scene, &lights, &Openings, Bounces::Count(1));
-        assert_eq!(solved, Ok(()));
+        let mut fresh = Frame::new(&scene, FrameConfig::default());
+        fresh.light_with(&lights, Bounces::Count(1));
         assert_eq!(difference(&frame, &fresh), None, "frame {step}");
-    }
-}
-
-/// Eight cells with eight connections have equally many walls in a ring, and in a room of four with a tail; but the
-/// tail's end is larger than any block of the ring.
-#[test]
-fn a_scene_with_larger_blocks_is_refused_or_solved() {
-    let mut ring: Vec<[i32; 2]> = (0..9).map(|k| [k % 3, k / 3]).collect();
-    ring.retain(|&cell| cell != [1, 1]);
-    let tail = [
-        [0, 0],
-        [1, 0],
-        [0, 1],
-        [1, 1],
-        [2, 1],
-        [3, 1],
-        [4, 1],
-        [5, 1],
-    ];
-    for assembled in [assembled, mobile] {
-        let (ring, tail) = (
-            assembled(&floor_plan(&ring, 0.5)),
-            assembled(&floor_plan(&tail, 0.5)),
-        );
-        assert_eq!(ring.texel_count(), tail.texel_count());
-        let mut frame = Frame::new(&ring);
-        let lamp = sphere(Vec3::new(0.5, 0.5, 0.5), 0.1, Vec3::ONE);
-        for scene in [&ring, &tail, &ring] {
-            match frame.solve(scene, &[lamp], &Openings, Bounces::Count(2)) {
-                Ok(()) => {
-                    let fresh = mrt_tests::solved(scene, &[lamp], Bounces::Count(2));
-                    assert_eq!(difference(&frame, &fresh), None);
-                }
-                Err(error) => assert!(matches!(error, FrameError::OtherScene { .. })),
-            }
-        }
     }
 }
 
@@ -475,14 +469,11 @@ fn faint_light_of_small_shapes_goes_out() {
         let middle = level.blocks[block].warp.center().as_vec3();
         sphere(middle + Vec3::new(aside, 0.2, -0.15), 0.1, Vec3::ONE)
     };
-    let mut exact = Frame::new(&scene);
+    let mut exact = Frame::new(&scene, FrameConfig::default());
     let lights = [lamp(3, 0.1), lamp(1, 0.1)];
-    assert_eq!(
-        exact.solve(&scene, &lights, &Openings, Bounces::Count(1)),
-        Ok(())
-    );
+    exact.light_with(&lights, Bounces::Count(1));
     let largest = |values: &[f32]| values.iter().fold(0.0f32, |m, &e| m.max(e));
-    let closed = scene.blocks[3].texels.clone();
+    let closed = scene.level.blocks[3].texels.clone();
     let closed = 3 * closed.start..3 * closed.end;
     let (direct, indirect) = (exact.direct(), exact.indirect());
     let config = FrameConfig {
@@ -490,13 +481,10 @@ fn faint_light_of_small_shapes_goes_out() {
         ..FrameConfig::default()
     };
     assert!(largest(&indirect[closed.clone()]) < 0.2 * config.tolerance);
-    let mut frame = Frame::with_config(&scene, config);
+    let mut frame = Frame::new(&scene, config);
     // The second frame leaves what it summed up for the row of blocks behind.
     for lights in [&lights[..], &[lights[0], lamp(1, -0.2)], &[lamp(1, -0.2)]] {
-        assert_eq!(
-            frame.solve(&scene, lights, &Openings, Bounces::Count(1)),
-            Ok(())
-        );
+        frame.light_with(lights, Bounces::Count(1));
     }
     assert_eq!(largest(&frame.indirect()[closed]), 0.0);
 }

@@ -16,11 +16,10 @@ use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::modular::variants::advice::{Thresholds, estimate_blocks};
 use mrt_dictionary::modular::variants::build::{VariantConfig, VariantError, make_variants};
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_runtime::level::block::{Block, Connection, Level, Opening};
-use mrt_runtime::level::shape::Shape;
-use mrt_runtime::modular::assemble::{AssembleConfig, AssembleError, assemble};
-use mrt_runtime::modular::dictionary::{Dictionary, WarpTransport};
-use mrt_runtime::modular::frame::{Bounces, Frame};
+use mrt_runtime::FrameConfig;
+use mrt_runtime::blocks::{Block, Connection, Opening, Shape, WarpTransport};
+use mrt_runtime::{AssembleConfig, AssembleError, Bounces, Dictionary, Frame, Level, Scene};
+use mrt_tests::FrameForTests;
 use mrt_tests::in_level_order;
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicBool;
@@ -114,7 +113,8 @@ fn adapted(level: &Level) -> Dictionary {
 /// a wall that of their centres would err more than what is measured here.
 fn indirect(level: &Level, direct: &[f64]) -> Vec<f64> {
     let dictionary = adapted(level);
-    let scene = assemble(level, &dictionary, &AssembleConfig::default()).expect("a sound level");
+    let scene =
+        Scene::assemble(level, &dictionary, &AssembleConfig::default()).expect("a sound level");
     let numbers: Vec<f32> = (0..3 * scene.texel_count()).map(|k| k as f32).collect();
     let mut frame_direct = vec![0.0; numbers.len()];
     for (places, &e) in in_level_order(level, &scene, &numbers).iter().zip(direct) {
@@ -122,10 +122,8 @@ fn indirect(level: &Level, direct: &[f64]) -> Vec<f64> {
             frame_direct[*place as usize] = e as f32;
         }
     }
-    let mut frame = Frame::new(&scene);
-    frame
-        .solve_from_direct(&scene, &frame_direct, Bounces::Count(BOUNCES as u32))
-        .expect("sound light");
+    let mut frame = Frame::new(&scene, FrameConfig::default());
+    frame.light_from(&frame_direct, Bounces::Count(BOUNCES as u32));
     in_level_order(level, &scene, &frame.indirect())
         .into_iter()
         .map(|rgb| f64::from(rgb[0]))
@@ -351,7 +349,7 @@ fn equal_blocks_share_operators_and_the_number_of_threads_changes_no_bit() {
     let dictionary = with_threads(1);
     // Two dead ends, which are turned against each other, and two blocks between them.
     assert_eq!(dictionary.variants.len(), 2);
-    let scene = assemble(&level, &dictionary, &AssembleConfig::default()).expect("sound");
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default()).expect("sound");
     let used: Vec<usize> = scene.blocks.iter().map(|b| b.shape_index).collect();
     assert_eq!(used, [0, 1, 1, 0]);
     assert_eq!(scene.shapes.len(), 2);
@@ -361,7 +359,7 @@ fn equal_blocks_share_operators_and_the_number_of_threads_changes_no_bit() {
 #[test]
 fn what_is_missing_is_named() {
     let level = with_transport(&corridor(&[2.0, 2.0]), WarpTransport::Rebuilt);
-    let error = assemble(&level, dictionary(), &AssembleConfig::default()).map(|_| ());
+    let error = Scene::assemble(&level, dictionary(), &AssembleConfig::default()).map(|_| ());
     let expected = AssembleError::MissingVariant {
         block: 0,
         shape: "dead_end",
@@ -374,8 +372,8 @@ fn what_is_missing_is_named() {
     let regathered = with_transport(&level, WarpTransport::Regathered);
     for wanted in [other, regathered] {
         let dictionary = adapted(&wanted);
-        assert!(assemble(&wanted, &dictionary, &AssembleConfig::default()).is_ok());
-        assert!(assemble(&level, &dictionary, &AssembleConfig::default()).is_err());
+        assert!(Scene::assemble(&wanted, &dictionary, &AssembleConfig::default()).is_ok());
+        assert!(Scene::assemble(&level, &dictionary, &AssembleConfig::default()).is_err());
     }
     let make = |dictionary: &Dictionary| {
         let config = VariantConfig::default();

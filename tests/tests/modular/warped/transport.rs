@@ -10,7 +10,7 @@ use mrt_dictionary::modular::light_prior::warped::warped_direct_samples;
 use mrt_dictionary::modular::variants::warp_error::{
     CanonicalOperators, guessed_error, warp_error,
 };
-use mrt_runtime::level::shape::{SHAPES, Shape};
+use mrt_runtime::blocks::{SHAPES, Shape};
 use mrt_tests::warped::*;
 
 const LIGHTS: u32 = 40;

@@ -1,0 +1,13 @@
+//! What levels are made of: blocks of canonical shapes, the openings that join them, and doors.
+//!
+//! Most levels are read from text ([`Level::from_text`](crate::Level::from_text)). A program that builds one fills the
+//! lists of a [`Level`](crate::Level) with these.
+
+pub use crate::level::block::{Block, Connection, Door, Opening};
+pub use crate::level::cells::CellsError;
+#[cfg(feature = "generator")]
+pub use crate::level::generator::maze;
+pub use crate::level::shape::{SHAPES, Shape};
+pub use crate::level::warp_transport::WarpTransport;
+pub use mrt_core::geometry::cube::{CubeRotation, Face};
+pub use mrt_core::geometry::hexahedron::Hexahedron;
