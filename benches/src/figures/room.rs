@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve_rgb;
 use mrt_core::reference::radiosity::transport::Transport;
@@ -101,7 +101,7 @@ pub fn exact(
         &scene,
         &transport,
         &direct,
-        Bounces::Count(bounces),
+        ReferenceBounces::Count(bounces),
         albedo,
     )?)
 }

@@ -164,7 +164,11 @@ fn a_stack_is_within_the_bounds_of_the_standard_preset() {
             .map(|e| f64::from(e[0]))
             .collect();
         let theirs = reference
-            .indirect_irradiance(light, mrt_core::reference::bounces::Bounces::First, 1.0)
+            .indirect_irradiance(
+                light,
+                mrt_core::reference::bounces::ReferenceBounces::First,
+                1.0,
+            )
             .expect("the file has the term");
         let hops = reference.hops(light).expect("the light is in the file");
         let by_hop = rel_l2_by_hop(&ours, &theirs, &hops);

@@ -164,7 +164,7 @@ impl Exact {
         let quarters = direct_quarters(&self.scene, &light, 4);
         let direct = quarters.iter().map(mean_of_quarters).collect();
         let albedo = vec![f64::from(ALBEDO); self.scene.texel_count()];
-        let bounces = mrt_core::reference::bounces::Bounces::Count(BOUNCES);
+        let bounces = mrt_core::reference::bounces::ReferenceBounces::Count(BOUNCES);
         let indirect = solve(&self.scene, &self.transport, &quarters, bounces, &albedo);
         (direct, indirect.expect("sizes fit"))
     }
