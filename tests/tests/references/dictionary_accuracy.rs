@@ -10,9 +10,10 @@ use mrt_core::reference::oracle_file::{
 };
 use mrt_dictionary::config::{BakeConfig, PriorConfig};
 use mrt_dictionary::modular::bake::bake;
-use mrt_dictionary::modular::light_prior::cube::{direct_samples, light_prior};
+use mrt_dictionary::modular::light_prior::basis::light_prior;
+use mrt_dictionary::modular::light_prior::cube::direct_samples;
 use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::level::block::Level;
