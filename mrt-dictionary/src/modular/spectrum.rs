@@ -1,9 +1,10 @@
 //! How fast singular values fall: the paper's table 2, on the closed cube.
 
 use crate::config::PriorConfig;
-use crate::modular::light_prior::cube::{direct_samples, light_prior};
+use crate::modular::light_prior::basis::light_prior;
+use crate::modular::light_prior::cube::direct_samples;
 use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
-use crate::modular::surface::mirrors::texel_parity_classes;
+use crate::modular::surface::mirrors::cube::texel_parity_classes;
 use crate::modular::transport::modes::{block_transport, fold_bounce};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::linalg::matrix::Matrix;

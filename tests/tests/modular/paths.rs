@@ -7,9 +7,10 @@ use mrt_core::linalg::matrix::Matrix;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
-use mrt_dictionary::modular::paths::transport::{
-    EMITTER, Gather, RECEIVER, Signals, gather, texel_at,
-};
+use mrt_dictionary::modular::paths::ends::{EMITTER, RECEIVER};
+use mrt_dictionary::modular::paths::gather::{Signals, gather};
+use mrt_dictionary::modular::surface::output_grid::OutputGrid;
+use mrt_dictionary::modular::surface::walls::cube::texel_at;
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::BlockIndex;
 use mrt_runtime::FrameConfig;
@@ -176,7 +177,7 @@ fn reversed(word: &Word) -> (Word, CubeSymmetry) {
 
 /// Transport from wall to wall along a path and back, both per unit of area.
 fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
-    let setup = Gather {
+    let setup = OutputGrid {
         resolution,
         probes: 0,
         vector: false,

@@ -1,6 +1,6 @@
 //! Which transport each block of a level needs: what its warp costs, measured, against what is accepted.
 
-use crate::modular::one_bounce::warped::WarpedWalls;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use crate::modular::variants::build::VariantError;
 use crate::modular::variants::warp_error::{CanonicalOperators, WarpError, warp_error};
 use crate::progress::Progress;

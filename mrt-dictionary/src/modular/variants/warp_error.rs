@@ -6,7 +6,8 @@
 //! a corner is dragged.
 
 use crate::modular::light_prior::warped::{warped_direct_samples, warped_light_radius};
-use crate::modular::one_bounce::warped::{WarpedWalls, warped_bounce_rows};
+use crate::modular::one_bounce::warped::warped_bounce_rows;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::{Matrix, dot, multiply, transpose_multiply};
