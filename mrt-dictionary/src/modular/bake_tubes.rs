@@ -96,7 +96,7 @@ pub fn bake_tubes(
     })
 }
 
-/// The basis of what the tubes send and of what becomes of it on its way.
+/// The basis of the lightfields that the tubes send, and of what passing through tubes makes of these.
 fn lightfields(
     grid: &LightfieldGrid,
     tubes: &[Tube],
@@ -107,7 +107,8 @@ fn lightfields(
     let mut sent = Vec::new();
     for tube in tubes {
         progress.check()?;
-        // What leaves by the other opening is the mirror image, whose parts of each parity are the same.
+        // What leaves by the other opening is the mirror image of this, and has the same part in each parity class but for
+        // its sign.
         let opening = tube.wall.form.openings()[0];
         sent.push(emitted(grid, tube, opening));
     }

@@ -1,4 +1,4 @@
-//! One basis per shape for the light of its own walls and that of other blocks.
+//! One basis per shape, for the light of its own walls and for the light of other blocks.
 //!
 //! The paper expands light from other blocks in a basis of its own for each opening, which is the largest
 //! stage of a frame in a large level. Both kinds of light are smooth on the same walls, so a basis for the first

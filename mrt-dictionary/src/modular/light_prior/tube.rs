@@ -1,5 +1,5 @@
-//! The light prior of round tubes: its lights, the direct light from them with shadows, and the basis of that (Loos et
-//! al. 2011, sections 4 and 6.1).
+//! The light prior of round tubes: its lights, the direct light from them with shadows, and the basis of this light (Loos
+//! et al. 2011, sections 4 and 6.1).
 
 use crate::config::PriorConfig;
 use crate::modular::light_prior::basis::{LightPrior, light_prior};
@@ -35,7 +35,7 @@ pub struct TubeLight {
 
 /// Sphere lights in a tube and in a straight tube attached to each opening, `per_axis`³ in each.
 ///
-/// The lattice is that of the cubes, at (i + 1) / (n + 1), with one axis along the tube and the other
+/// As in cubes, the lattice has points at (i + 1) / (n + 1), with one axis along the tube and the other
 /// two carried to its section by the concentric map. No light is nearer to the wall than
 /// R times 2 / (n + 1) (0.114 for n = 6), and the lattice has every mirror of the tube. A cubic lattice without the
 /// lights in the wall would leave a ragged edge there.
@@ -59,7 +59,7 @@ fn lattice(form: TubeForm, per_axis: usize) -> Vec<(TubeLight, Place)> {
             let along = (i + 1) as f64 / (n + 1) as f64;
             for row in 0..n {
                 for column in 0..n {
-                    // Centres of n cells lie at (k + 1/2) / n; those of the lattice at (k + 1) / (n + 1).
+                    // Centres of n cells lie at (k + 1/2) / n, and points of the lattice at (k + 1) / (n + 1).
                     let square = cell_center(n, row, column) * (n as f64 / (n + 1) as f64);
                     let section = disk_from_square(square) * TUBE_RADIUS;
                     let position = match beyond {

@@ -260,7 +260,7 @@ mod tests {
             .map(|s| grid.root_weight(s) * grid.root_weight(s))
             .sum();
         // The mean cosine over equal solid angles is 1/2. It is 1 - max(a, b)² on the square, whose
-        // midpoint rule over n² cells is too large by 2/n² of it; n is 6 cells of 2 super-samples.
+        // midpoint rule over n² cells is too large by the fraction 2/n²; n is 6 cells of 2 super-samples.
         let excess = flux / PI - 1.0;
         assert!((excess - 2.0 / 144.0).abs() < 1e-12, "{excess}");
     }

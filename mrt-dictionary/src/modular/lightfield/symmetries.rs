@@ -33,7 +33,7 @@ pub fn rolled(grid: &LightfieldGrid, fields: &Matrix<f64>) -> Matrix<f64> {
     })
 }
 
-/// Lightfields whose value at each sample is that of another sample.
+/// Lightfields in which each sample has the value that its source had.
 fn with_sources(
     grid: &LightfieldGrid,
     fields: &Matrix<f64>,

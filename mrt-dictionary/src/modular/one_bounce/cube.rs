@@ -26,7 +26,7 @@ pub enum Reconstruction {
     Bilinear,
 }
 
-/// Parts into which a texel is cut, along each axis, to integrate a bilinear reconstruction.
+/// Number of parts, along each axis, into which a texel is cut to integrate a bilinear reconstruction.
 const BILINEAR_PARTS: usize = 4;
 
 /// The operator of the closed cube at `resolution`² texels a face, texels x texels.
@@ -34,7 +34,7 @@ const BILINEAR_PARTS: usize = 4;
 /// Cost: resolution⁴ x 30 polygon evaluations, an eighth of that by symmetry; 0.2 s at 16².
 ///
 /// # Errors
-/// [`Cancelled`], when the caller's progress says so.
+/// [`Cancelled`], if the caller has asked to stop.
 pub fn closed_cube_bounce(
     resolution: usize,
     reconstruction: Reconstruction,

@@ -32,7 +32,7 @@ impl Parts {
     pub const STANDARD: Parts = Parts { far: 4, near: 8 };
 }
 
-/// A texel is near where the receiver is nearer to its centre than this many of its longer sides.
+/// A texel is near if its centre is nearer to the receiver than this number of the texel's longer sides.
 pub const NEAR_WIDTHS: f64 = 4.0;
 
 /// F of a tube, texels x texels: one value a texel, receivers at texel centres.

@@ -1,9 +1,9 @@
 //! What shapes send through their openings, reduced: one basis for all of them.
 //!
 //! Light that leaves through an opening is the radiosity of the walls behind it, so the paths of a table start
-//! from a basis for radiosity on the walls of [`EMITTER`]. A texel counts with its form factor to the opening: in
-//! that norm the scalar product of two signals is that of the lightfields that they send (the paper reduces the
-//! lightfields themselves, section 5.1).
+//! from a basis for radiosity on the walls of [`EMITTER`]. A texel counts with its form factor to the opening. In
+//! that norm two signals have the scalar product of the lightfields that they send. (The paper reduces the
+//! lightfields themselves, section 5.1.)
 
 use crate::matrix_parts::scaled_rows;
 use crate::modular::paths::ends::{EMITTER, PathFrame};
@@ -31,8 +31,8 @@ pub struct EmissionBasis {
     pub dropped_energy: f64,
 }
 
-/// Radiosity of a shape's walls (texels x signals) as that of the emitter behind one of its openings, in one of the frames
-/// there. Holes take away their part of a texel.
+/// Radiosity of a shape's walls (texels x signals) carried over to the texels of [`EMITTER`], which takes the place of the
+/// shape behind one of its openings, in one of the frames there. Holes take away their part of a texel.
 pub fn emitter_radiosity(
     shape: &Shape,
     opening: Face,

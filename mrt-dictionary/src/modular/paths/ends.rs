@@ -43,8 +43,8 @@ impl PathFrame {
     /// Both frames.
     pub const ALL: [PathFrame; 2] = [PathFrame::Upright, PathFrame::Exchanged];
 
-    /// From the canonical frame of a path, in which light heads for +z, to that of a shape, in which light crosses the
-    /// opening with `heading`.
+    /// Takes the canonical frame of a path, in which light heads for +z, to the frame of a shape, in which light crosses
+    /// the opening with `heading`.
     pub fn of_heading(self, heading: Face) -> CubeSymmetry {
         let frame = frame_of_heading(heading);
         match self {

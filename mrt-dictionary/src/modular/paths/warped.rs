@@ -1,9 +1,9 @@
 //! Light through the openings of a warped block, in the terms of the canonical ones.
 //!
-//! The operators between openings are those of unit cubes. What passes an opening is a lightfield, and that of a
-//! long block differs from a cube's: its walls end further away, and a far wall sees less of the opening. The paper
-//! scales the canonical operators with the block and leaves it at that. Here both ends are corrected, from the
-//! middle of the opening, in coordinates in which the opening is the unit square and depth has the scale of the root of
+//! The operators between openings are those of unit cubes. But the lightfield at an opening of a long block differs from
+//! that of a cube: the block's walls end further away, and a far wall sees less of the opening. The paper
+//! scales the canonical operators with the block and does no more. Here both ends are corrected, as seen from the
+//! middle of the opening, in coordinates in which the opening is the unit square and depth is scaled by the root of
 //! its area:
 //!
 //! - light that leaves is the radiosity of a unit cube behind the opening that looks the same from there;
@@ -92,8 +92,8 @@ impl<'a> OpeningView<'a> {
         }
     }
 
-    /// Radiosity of the walls (texels x signals) as that of the canonical emitter behind the opening, in one of the frames
-    /// there.
+    /// Radiosity of the walls (texels x signals) carried over to the texels of [`EMITTER`], which takes the place of the
+    /// block behind the opening, in one of the frames there.
     pub fn emitter_radiosity(&self, frame: PathFrame, radiosity: &Matrix<f64>) -> Matrix<f64> {
         let resolution = self.walls.resolution;
         let frame = frame.of_heading(self.face);
@@ -222,8 +222,8 @@ impl<'a> OpeningView<'a> {
             .collect()
     }
 
-    /// Form factor of the opening on a texel over that of the cube's opening on a point of the cube's wall; `None` where
-    /// the latter is grazing.
+    /// Form factor of the opening on a texel, divided by the form factor of the cube's opening on a point of the cube's
+    /// wall; `None` where the latter is grazing.
     fn share_of_cube(&self, texel: usize, face: Face, point: DVec3) -> Option<f64> {
         let on_cube = point_to_polygon(point, -face.outward(), &self.unit_corners);
         if on_cube < LEAST_FACTOR {

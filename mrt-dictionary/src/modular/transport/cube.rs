@@ -32,8 +32,8 @@ use mrt_runtime::low_level::modular::path::{Crossing, Word, hole_of};
 #[derive(Clone, Debug)]
 pub struct Neighbour {
     outline: Outline,
-    /// Rows x texels of the emitter. Scalar products of its columns are those of the light on the walls and at the probes
-    /// beyond.
+    /// Rows x texels of the emitter. Two of its columns have the scalar product of the light that the two texels send to the
+    /// walls and the probes beyond.
     operator: Matrix<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! The modes of one tube, chosen for the light on its own wall and on that of the tubes beyond its openings, as
+//! The modes of one tube, chosen for the light on its own wall and on the walls of the tubes beyond its openings, as
 //! [`crate::modular::transport::cube`] does for cubes. Everything counts by area ([`AreaWeights`]).
 
 use crate::config::BakeConfig;
@@ -65,7 +65,7 @@ pub fn tube_transport(
     Ok(unweighed(&weights, weighted))
 }
 
-/// The operators in terms of plain texel values, from those of weighted F and prior.
+/// The operators in terms of plain texel values, from operators between signals weighted by area.
 fn unweighed(weights: &AreaWeights, weighted: BlockTransport) -> BlockTransport {
     let coefficients = &weighted.coefficients_from_direct;
     BlockTransport {

@@ -107,7 +107,7 @@ fn wall_constants(walls: &WarpedWalls, columns: usize) -> Matrix<f64> {
     })
 }
 
-/// Scaled to a Frobenius norm. Samples of lights that light nothing stay as they are.
+/// Scaled to a Frobenius norm. A matrix of zeros stays as it is.
 fn normalized(a: Matrix<f64>, norm: f64) -> Matrix<f64> {
     let found = a.frobenius_norm();
     if found == 0.0 {

@@ -1,5 +1,4 @@
-//! Operators for the warped blocks of a level, from nothing but a dictionary: a list of calls, like
-//! [`crate::modular::bake`].
+//! Operators for the warped blocks of a level, computed from a dictionary alone.
 //!
 //! A variant's responses and emission are in the dictionary's own modes, so that blocks with and without variants
 //! exchange light through the same table of paths.
@@ -31,7 +30,7 @@ impl Default for VariantConfig {
     }
 }
 
-/// Why operators of warped blocks cannot be made or their need not be measured.
+/// Why operators of warped blocks cannot be made, or the need for them cannot be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VariantError {
     /// The dictionary was packed for shipping, and lacks what operators of warped blocks are computed from.

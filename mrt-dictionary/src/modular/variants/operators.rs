@@ -27,8 +27,8 @@ use mrt_runtime::low_level::level::shape::Outline;
 use mrt_runtime::low_level::level::warp_form::{WarpForm, warp_of};
 use mrt_runtime::low_level::modular::dictionary::{OpeningOperators, ShapeOperators, Sources};
 
-/// The response basis as a bake has it, but for vector irradiance and the operators of paths. Its scales are not in the
-/// file; they follow from what shapes emit and what paths make of it.
+/// The response basis as a bake has it, without vector irradiance and without the operators of paths. A dictionary does not
+/// store its scales; they follow from what shapes emit and what the paths make of that.
 pub(super) fn stored_response(dictionary: &Dictionary, sources: &Sources) -> ResponseBasis {
     let walls = RECEIVER.texel_count(dictionary.resolution);
     let stored: Matrix<f64> = sources.response_basis.cast();

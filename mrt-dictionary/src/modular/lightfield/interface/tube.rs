@@ -1,8 +1,8 @@
 //! Operators between the round openings of tubes (Loos et al. 2011, sections 5.1
 //! and 6.1): what a tube sends out, and how lightfields pass through tubes.
 //!
-//! The canonical interface is that of the cubes, the face z = 0 crossed towards +z with v up, and so is its
-//! grid of samples, but for its positions ([`LightfieldGrid::on_discs`]).
+//! The canonical interface is the same as for cubes, the face z = 0 crossed towards +z with v up. Its grid of samples
+//! differs only in its positions ([`LightfieldGrid::on_discs`]).
 
 use crate::config::LightfieldConfig;
 use crate::matrix_parts::{root_sum_of_squares, scaled};

@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 
 /// Cells along each axis into which the interface is cut to light the walls.
 const RESPONSE_CELLS: usize = 24;
-/// Cells nearer to the receiving point than this many of their widths are cut once more.
+/// Cells nearer to the receiving point than this number of cell widths are cut once more.
 const NEAR_CELLS: f64 = 4.0;
 /// Parts along each axis of a near cell.
 const NEAR_PARTS: usize = 4;

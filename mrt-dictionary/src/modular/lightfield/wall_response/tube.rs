@@ -23,7 +23,7 @@ use std::f64::consts::PI;
 
 /// Cells along each axis of the square into which the disc is cut to light the walls.
 const RESPONSE_CELLS: usize = 24;
-/// Cells nearer to the texel than this many of their widths are cut once more.
+/// Cells nearer to the texel than this number of cell widths are cut once more.
 const NEAR_CELLS: f64 = 4.0;
 /// Parts along each axis of a near cell.
 const NEAR_PARTS: usize = 4;
@@ -104,7 +104,7 @@ struct DiscCell {
     center: DVec3,
     /// (u, v) of the centre in the frame of light that enters.
     uv: DVec2,
-    /// Area of the cell, whose outer edges may be arcs, over that of the quadrilateral of its corners.
+    /// Area of the cell, whose outer edges may be arcs, divided by the area of the quadrilateral of its corners.
     area_ratio: f64,
 }
 

@@ -73,8 +73,8 @@ fn bends_lose_only_what_rays_see_leaving() {
     let traced = ray_traced_tube_bounce(&wall, RAYS);
     for i in 0..factors.rows() {
         let sum = |m: &Matrix<f64>| (0..m.columns()).map(|j| m[(i, j)]).sum::<f64>();
-        // The error of an area under a curve by a net of n = 2^14 points, some n^-3/4 or 7e-4, and that of the parts'
-        // shadows.
+        // A net of n = 2^14 points errs by some n^-3/4, or 7e-4, in an area under a curve. The other part is the shadows of
+        // parts.
         let bound = 2e-3;
         assert!((sum(&factors) - sum(&traced)).abs() < bound, "{i}");
     }

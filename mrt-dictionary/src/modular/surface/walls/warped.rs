@@ -4,7 +4,7 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// Wall faces of a cube with the images of their texels under a warp. Texels are numbered as those of a
+/// The walls of a cube with the images of their texels under a warp. Texels are numbered as in a
 /// shape: wall by wall, row by row, column by column.
 #[derive(Clone, Debug)]
 pub struct WarpedWalls {

@@ -278,7 +278,7 @@ fn reduced_operators_follow_the_full_ones() {
     let plain = lightfield_basis(&grid, &columns, modes, &progress).expect("nobody cancels");
     let basis = tube_enriched_basis(&grid, &plain, &config, &progress).expect("nobody cancels");
     let operators = tube_interface(&grid, &basis, &progress).expect("nobody cancels");
-    // A turn loses only what the truncated basis does not hold of it.
+    // A quarter turn loses only what the truncated basis does not hold.
     let turned = transpose_multiply(operators.roll.view(), operators.roll.view());
     let first = turned[(0, 0)];
     assert!((first - 1.0).abs() < 0.02, "{first}");
