@@ -76,7 +76,10 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             marker,
         ));
     }
-    while texture.upload(&frame, &frame.solve()) > 0 {}
+    let mut report = frame.solve();
+    while texture.upload(&frame, &report) > 0 {
+        report = frame.solve();
+    }
     println!("the torch rests: frames upload nothing");
     Picture::sheet(&pictures, 3).write(out, "moving_light.png", 1.5)
 }
