@@ -5,7 +5,7 @@
 //! channel. Axes are right-handed with +Y up. Bakes use `f64` and only operations whose bits do not depend
 //! on the machine; see `docs/CONVENTIONS.md`.
 //!
-//! Features: `svd` adds `linalg::svd`, `bvh` adds `geometry::bvh`, and `reference` adds `reference`. A
+//! Features: `svd` adds decompositions to `linalg`, `bvh` adds `geometry::bvh`, and `reference` adds `reference`. A
 //! running game needs none of them.
 
 pub mod linalg;
