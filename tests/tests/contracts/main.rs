@@ -2,6 +2,7 @@
 
 mod bake_reproducible;
 mod direct_light;
+mod documents;
 mod doors;
 mod facade;
 mod frame;
