@@ -6,7 +6,7 @@ mod common;
 
 use common::picture::Picture;
 use common::view::{self, Camera, Shown};
-use mrt_runtime::blocks::Door;
+use mrt_runtime::blocks::{Connection, Door};
 use mrt_runtime::glam::{Vec3, vec3};
 use mrt_runtime::{
     AssembleConfig, BlockIndex, Dictionary, Frame, FrameConfig, Level, Light, Scene,
@@ -26,9 +26,8 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     let mut level = Level::from_cells(&cells, vec3(0.75, 0.68, 0.6))?;
     // A door is a connection that can be closed, here the one between the last two cells. It costs nothing while it
     // stands still, so give one to every opening that may ever close.
-    let connects =
-        |a, b| move |c: &mrt_runtime::blocks::Connection| (c.a.block, c.b.block) == (a, b);
-    let connection = level.connections.iter().position(connects(1, 2));
+    let is_between = |c: &Connection| (c.a.block, c.b.block) == (1, 2);
+    let connection = level.connections.iter().position(is_between);
     level.doors.push(Door {
         connection: connection.ok_or("cells 1 and 2 do not touch")?,
         value: 1.0,
@@ -61,7 +60,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
         let door = |eye, direction| {
             let (from, to) = (vec3(1.98, 0.0, open), vec3(2.02, 1.0, 1.0));
             let distance = view::cuboid(eye, direction, from, to)?;
-            Some((distance, Vec3::new(0.05, 0.035, 0.02)))
+            Some((distance, Vec3::new(0.1, 0.06, 0.03)))
         };
         pictures.push(view::draw(
             &level,
@@ -71,5 +70,5 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             |eye, direction| view::nearer(torch(eye, direction), door(eye, direction)),
         ));
     }
-    Picture::sheet(&pictures, 1).write(out, "doors.png", 1.5)
+    Picture::sheet(&pictures, 1).write(out, "doors.png", 0.6)
 }

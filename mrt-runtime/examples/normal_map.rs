@@ -43,7 +43,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
 
     // Normals are in the frame of the wall: along u, along v, and out of the wall.
     let flat = light_on_wall(&frame, |_, _| Vec3::Z);
-    let bumpy = light_on_wall(&frame, brick_normal);
+    let bumpy = light_on_wall(&frame, common::brick_normal);
     for (u, side) in [(0.05, "left"), (0.95, "right")] {
         let lit = |normal| at(&frame, [u, 0.5], normal).element_sum() / 3.0;
         println!(
@@ -57,7 +57,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
         "a texel takes {} numbers a channel",
         frame.vector().len() / (3 * scene.texel_count())
     );
-    Picture::sheet(&[flat, bumpy], 2).write(out, "normal_map.png", 3.0)
+    Picture::sheet(&[flat, bumpy], 2).write(out, "normal_map.png", 0.7)
 }
 
 /// The wall that a visitor of the middle block has to the left, under indirect light.
@@ -73,39 +73,11 @@ fn light_on_wall(frame: &Frame, normal: impl Fn(f32, f32) -> Vec3) -> Picture {
 /// Indirect irradiance at a point of the wall for a normal, between the four nearest texels. A shader has the coefficients
 /// in four textures, which the GPU interpolates, and multiplies them with the normal.
 fn at(frame: &Frame, [u, v]: [f32; 2], normal: Vec3) -> Vec3 {
-    let resolution = frame.scene().level.resolution;
+    let scene = frame.scene();
     let block = BlockIndex::new(1);
-    let texel = |column: usize, row: usize| {
-        let last = resolution - 1;
-        let texel =
-            frame
-                .scene()
-                .level
-                .level_texel(block, Face::NegZ, row.min(last), column.min(last));
-        texel
-            .and_then(|texel| frame.vector_at(block, texel, normal))
-            .unwrap_or(Vec3::ZERO)
-    };
-    let place = |x: f32| (x * resolution as f32 - 0.5).max(0.0);
-    let (x, y) = (place(u), place(v));
-    let (column, row) = (x as usize, y as usize);
-    let low = texel(column, row).lerp(texel(column + 1, row), x.fract());
-    let high = texel(column, row + 1).lerp(texel(column + 1, row + 1), x.fract());
-    low.lerp(high, y.fract())
-}
-
-/// The normal of a made-up wall of bricks with round edges.
-fn brick_normal(u: f32, v: f32) -> Vec3 {
-    let height = |u: f32, v: f32| {
-        let (row, along) = ((v * 8.0).floor(), v * 8.0);
-        let across = u * 4.0 + 0.5 * (row % 2.0);
-        let to_edge = |x: f32| (0.5 - (x.fract() - 0.5).abs()).max(0.0);
-        let distance = (to_edge(across) * 2.0).min(to_edge(along)) / 0.22;
-        0.02 * (1.0 - (1.0 - distance.min(1.0)).powi(2))
-            + 0.0015 * ((u * 90.0).sin() * (v * 70.0).sin())
-    };
-    let step = 1e-3;
-    let slope_u = (height(u + step, v) - height(u - step, v)) / (2.0 * step);
-    let slope_v = (height(u, v + step) - height(u, v - step)) / (2.0 * step);
-    vec3(-slope_u, -slope_v, 1.0).normalize()
+    common::bilinear(scene.resolution(), [u, v], |row, column| {
+        let texel = scene.texel(block, Face::NegZ, row, column);
+        let light = texel.and_then(|texel| frame.vector_at(block, texel, normal));
+        light.unwrap_or(Vec3::ZERO)
+    })
 }

@@ -82,7 +82,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
         let column = |eye, direction| {
             let (low, high) = pillar?.corners();
             let distance = view::cuboid(eye, direction, low, high)?;
-            Some((distance, Vec3::splat(0.04)))
+            Some((distance, Vec3::splat(0.1)))
         };
         pictures.push(view::draw(
             &level,
@@ -92,5 +92,5 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             |eye, direction| view::nearer(torch(eye, direction), column(eye, direction)),
         ));
     }
-    Picture::sheet(&pictures, 3).write(out, "own_shadows.png", 1.5)
+    Picture::sheet(&pictures, 3).write(out, "own_shadows.png", 0.6)
 }

@@ -93,5 +93,5 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     let picture = view::draw(&level, &frame, camera, Shown::Indirect, |eye, direction| {
         view::nearer(torch(eye, direction), ball(eye, direction))
     });
-    picture.write(out, "probes.png", 4.0)
+    picture.write(out, "probes.png", 1.8)
 }

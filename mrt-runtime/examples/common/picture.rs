@@ -52,8 +52,7 @@ impl Picture {
         })
     }
 
-    /// Writes a PNG file: bright light is compressed, so that none is clipped, and encoded as sRGB. Returns the brightest
-    /// byte.
+    /// Writes a PNG file: bright light is compressed, so that none is clipped, and encoded as sRGB.
     pub fn write(&self, folder: &Path, name: &str, exposure: f32) -> Result<(), Box<dyn Error>> {
         let encode = |x: f32| {
             let shown = 1.0 - (-x * exposure).exp();

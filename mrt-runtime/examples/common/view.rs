@@ -4,6 +4,7 @@
 //! [`Block::canonical_warp`](mrt_runtime::blocks::Block::canonical_warp), and its texture coordinate from
 //! [`Lightmap::texture_coordinate`](mrt_runtime::Lightmap::texture_coordinate).
 
+use super::bilinear;
 use super::picture::Picture;
 use mrt_runtime::blocks::Face;
 use mrt_runtime::glam::{Vec3, vec3};
@@ -25,7 +26,7 @@ impl Camera {
     /// Looks down on all of a level whose floor is `size` metres along x and z, from (0, 0) on.
     pub fn above(size: [f32; 2], pixels: [usize; 2]) -> Self {
         let center = vec3(0.5 * size[0], 0.3, 0.5 * size[1]);
-        let distance = 1.5 * size[0].max(size[1] * pixels[0] as f32 / pixels[1] as f32);
+        let distance = 2.0 + 1.15 * size[0].max(size[1] * pixels[0] as f32 / pixels[1] as f32);
         Self {
             eye: center + distance * vec3(0.0, 0.85, 0.53),
             target: center,
@@ -50,6 +51,7 @@ pub type Hit = Option<(f32, Vec3)>;
 struct Wall {
     block: BlockIndex,
     face: Face,
+    first_texel: usize,
     origin: Vec3,
     along_u: Vec3,
     along_v: Vec3,
@@ -58,7 +60,7 @@ struct Wall {
     albedo: Vec3,
 }
 
-fn walls(level: &Level) -> Vec<Wall> {
+fn walls(level: &Level, resolution: usize) -> Vec<Wall> {
     let mut walls = Vec::new();
     for (index, block) in level.blocks.iter().enumerate() {
         let warp = block.canonical_warp();
@@ -71,6 +73,7 @@ fn walls(level: &Level) -> Vec<Wall> {
             Wall {
                 block: BlockIndex::new(index),
                 face,
+                first_texel: block.shape.wall_offset(face, resolution).unwrap_or(0),
                 origin,
                 along_u,
                 along_v,
@@ -90,7 +93,7 @@ pub fn draw(
     shown: Shown,
     thing: impl Fn(Vec3, Vec3) -> Hit,
 ) -> Picture {
-    let walls = walls(level);
+    let walls = walls(level, frame.scene().resolution());
     let forward = (camera.target - camera.eye).normalize();
     let right = forward.cross(Vec3::Y).normalize();
     let down = forward.cross(right);
@@ -142,20 +145,11 @@ fn irradiance(frame: &Frame, wall: &Wall, [u, v]: [f32; 2], shown: Shown) -> Vec
 
 /// Direct light between the four nearest texels of a wall.
 fn direct(frame: &Frame, wall: &Wall, [u, v]: [f32; 2]) -> Vec3 {
-    let level = &frame.scene().level;
-    let n = level.resolution;
-    let shape = level.blocks[wall.block.get()].shape;
-    let first = shape.wall_offset(wall.face, n).unwrap_or(0);
-    let texel = |column: usize, row: usize| {
-        let texel = first + row.min(n - 1) * n + column.min(n - 1);
+    let n = frame.scene().resolution();
+    bilinear(n, [u, v], |row, column| {
+        let texel = wall.first_texel + row * n + column;
         frame.direct_at(wall.block, texel).unwrap_or(Vec3::ZERO)
-    };
-    let (x, y) = ((u * n as f32 - 0.5).max(0.0), (v * n as f32 - 0.5).max(0.0));
-    let (column, row) = (x as usize, y as usize);
-    let (right, up) = (x.fract(), y.fract());
-    let low = texel(column, row).lerp(texel(column + 1, row), right);
-    let high = texel(column, row + 1).lerp(texel(column + 1, row + 1), right);
-    low.lerp(high, up)
+    })
 }
 
 /// Distance, in lengths of `direction`, at which a ray meets a ball.
