@@ -76,19 +76,11 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
         let shown = Shown::DirectAndIndirect;
         pictures.push(view::draw(&level, &frame, camera, shown, marker));
     }
-<<<<<<< HEAD
-    let mut report = frame.solve();
-    while texture.upload(&frame, &report) > 0 {
-        report = frame.solve();
-    }
-    println!("the torch rests: frames upload nothing");
-=======
     let mut frames = 1;
     while frame.solve().changed_tiles().len() > 0 {
         frames += 1;
     }
     println!("the torch rests: nothing is left to upload after {frames} frames");
->>>>>>> ex
     Picture::sheet(&pictures, 3).write(out, "moving_light.png", 1.5)
 }
 
