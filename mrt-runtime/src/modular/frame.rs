@@ -30,7 +30,7 @@ use crate::modular::frame::direct_stage::{DirectJob, DirectStage};
 use crate::modular::frame::error::FrameError;
 use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::light_list::{LightId, LightList};
-use crate::modular::frame::outputs::OutputBuffers;
+use crate::modular::frame::outputs::{OutputBuffers, OutputStage};
 use crate::modular::frame::report::{FrameReport, FrameWork, ReportSlot};
 use crate::modular::frame::schedule::Schedule;
 use crate::modular::frame::stage_clock::{Stage, StageClock};
@@ -275,6 +275,8 @@ impl Frame {
         }
         self.schedule.state[rank.get()].has_indirect = true;
         self.schedule.touch(rank, f32::INFINITY);
+        // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their turn.
+        self.schedule.mark_changed(rank);
     }
 }
 
@@ -362,14 +364,14 @@ impl Frame {
             // Where truncation leaves walls dark, probes may still hold a little light, and no list knows of it.
             self.outputs.darken();
         }
-        self.outputs.fill(
-            &self.scene,
-            &self.config,
-            &mut self.schedule,
-            &mut self.light,
+        self.outputs.fill(OutputStage {
+            scene: &self.scene,
+            config: &self.config,
+            schedule: &mut self.schedule,
+            light: &mut self.light,
             report,
-            &mut clock,
-        );
+            clock: &mut clock,
+        });
         #[cfg(feature = "timing")]
         {
             report.times = clock.times();

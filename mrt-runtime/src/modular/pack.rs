@@ -90,16 +90,21 @@ pub fn pack<M: OperatorMatrix>(
         packed.sources = None;
     }
     if !config.lightfields && !needs_lightfields {
-        packed.lightfields = LightfieldOperators {
-            parity: Vec::new(),
-            from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
-            straight: M::empty(0, 0),
-            left: M::empty(0, 0),
-            exchange: M::empty(0, 0),
-            holes: Vec::new(),
-            response_from_lightfield: M::empty(dictionary.response_modes(), 0),
-            dropped_energy: dictionary.lightfields.dropped_energy,
-        };
+        packed.lightfields = no_lightfields(dictionary);
     }
     Ok(packed)
+}
+
+/// Lightfield operators without modes, for the emission and response modes of a dictionary.
+fn no_lightfields<M: OperatorMatrix>(dictionary: &Dictionary<M>) -> LightfieldOperators<M> {
+    LightfieldOperators {
+        parity: Vec::new(),
+        from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
+        straight: M::empty(0, 0),
+        left: M::empty(0, 0),
+        exchange: M::empty(0, 0),
+        holes: Vec::new(),
+        response_from_lightfield: M::empty(dictionary.response_modes(), 0),
+        dropped_energy: dictionary.lightfields.dropped_energy,
+    }
 }

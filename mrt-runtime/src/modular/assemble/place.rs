@@ -97,8 +97,7 @@ pub(super) fn scene_blocks(
     place.collect()
 }
 
-/// How the canonical cubes on both sides of a connection stand to each other, read off the corners that
-/// meet.
+/// What lies beyond a connected opening.
 fn crossing(
     level: &Level,
     dictionary: &Dictionary<impl Sized>,
@@ -108,47 +107,15 @@ fn crossing(
     let canonical_face =
         |end: Opening| level.blocks[end.block].orientation.inverse().face(end.face);
     let (face_here, face_there) = (canonical_face(here), canonical_face(there));
-    let warp_here = level.blocks[here.block].canonical_warp();
-    let warp_there = level.blocks[there.block].canonical_warp();
-    // The corner of this block's cube that coincides with a corner of the other's face.
-    let matching = |unit_there: DVec3| {
-        let world = warp_there.corners[corner_index(unit_there)];
-        face_here
-            .rectangle([0.0, 1.0], [0.0, 1.0])
-            .into_iter()
-            .min_by(|a, b| {
-                let distance =
-                    |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
-                distance(a).total_cmp(&distance(b))
-            })
-            .unwrap_or(unit_there)
-    };
-    let origin = matching(face_there.point(0.0, 0.0));
-    let images = [
-        (
-            face_there.u_axis(),
-            matching(face_there.point(1.0, 0.0)) - origin,
-        ),
-        (
-            face_there.v_axis(),
-            matching(face_there.point(0.0, 1.0)) - origin,
-        ),
-        (
-            face_there.axis(),
-            -face_here.outward() * face_there.outward()[face_there.axis()],
-        ),
-    ];
-    let image_of = |axis: usize| {
-        images
-            .iter()
-            .find(|(a, _)| *a == axis)
-            .and_then(|(_, d)| Face::ALL.into_iter().find(|face| face.outward() == *d))
-    };
-    let rotation = match (image_of(0), image_of(1)) {
-        (Some(x), Some(y)) => CubeRotation::from_images(x, y),
+    let images = images_of_axes(
+        (&level.blocks[here.block].canonical_warp(), face_here),
+        (&level.blocks[there.block].canonical_warp(), face_there),
+    );
+    let rotation = match images {
+        [Some(x), Some(y), _] => CubeRotation::from_images(x, y),
         _ => None,
     };
-    let up = image_of(1);
+    let up = images[1];
     // Holes know which way is up, and so do dictionaries whose shapes open sideways only.
     let outline = level.blocks[here.block].shape.opening(face_here);
     let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
@@ -158,7 +125,7 @@ fn crossing(
         Some(Face::NegY) => !has_hole && dictionary.knows_parities(),
         _ => dictionary.has_exchanges() && !has_hole,
     };
-    let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == image_of(2));
+    let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == images[2]);
     match proper {
         Some(here_from_there) => Ok(Beyond::Block {
             block: BlockIndex::new(there.block),
@@ -173,6 +140,35 @@ fn crossing(
             found: up.map_or("no single direction".to_owned(), |face| face.to_string()),
         }),
     }
+}
+
+/// Where +x, +y and +z of the canonical cube there point in the canonical cube here, read off the corners that meet in the
+/// joined faces. `None` for an axis that has no single direction.
+fn images_of_axes(
+    (warp_here, face_here): (&Hexahedron, Face),
+    (warp_there, face_there): (&Hexahedron, Face),
+) -> [Option<Face>; 3] {
+    // The corner of the face here that is nearest to a corner of the face there.
+    let matching = |unit_there: DVec3| {
+        let world = warp_there.corners[corner_index(unit_there)];
+        let distance = |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
+        face_here
+            .rectangle([0.0, 1.0], [0.0, 1.0])
+            .into_iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(unit_there)
+    };
+    let face_along = |direction: DVec3| {
+        let mut faces = Face::ALL.into_iter();
+        faces.find(|face| face.outward() == direction)
+    };
+    let origin = matching(face_there.point(0.0, 0.0));
+    let axis = face_there.axis();
+    let mut images = [None; 3];
+    images[face_there.u_axis()] = face_along(matching(face_there.point(1.0, 0.0)) - origin);
+    images[face_there.v_axis()] = face_along(matching(face_there.point(0.0, 1.0)) - origin);
+    images[axis] = face_along(-face_here.outward() * face_there.outward()[axis]);
+    images
 }
 
 /// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the

@@ -1,7 +1,9 @@
 //! Limits and errors of dictionary files, and what every version of them is read by.
 
 use crate::level::shape::{SHAPES, Shape};
+use crate::modular::dictionary::OperatorKind;
 use mrt_core::container::{ByteBudget, Container, ContainerError, Format};
+use mrt_core::storage::{StoredMatrix, StoredSection, read_stored};
 
 /// Version that is written, and the newest that is read.
 pub const DICTIONARY_VERSION: u32 = 2;
@@ -124,7 +126,25 @@ pub(super) struct Source<'a, 'c, 'b> {
     pub budget: &'b mut ByteBudget,
 }
 
-impl Source<'_, '_, '_> {
+impl<'a> Source<'a, '_, '_> {
+    /// A matrix of these sizes. Version 1 has no scales, so it can only hold matrices of F32.
+    pub(super) fn matrix(
+        &mut self,
+        kind: OperatorKind,
+        section: &str,
+        [rows, columns]: [usize; 2],
+    ) -> Result<StoredMatrix<'a>, DictionaryError> {
+        self.check_length(section, rows * columns)?;
+        let section = StoredSection {
+            values: section,
+            scales: &scales_name(section),
+            rows,
+            columns,
+            modes: kind.modes(),
+        };
+        Ok(read_stored(self.container, &section, self.budget)?)
+    }
+
     pub(super) fn numbers(
         &mut self,
         section: &str,

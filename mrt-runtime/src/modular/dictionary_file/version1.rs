@@ -17,13 +17,13 @@ use crate::modular::dictionary::{
     StoredDictionary,
 };
 use crate::modular::dictionary_file::format::{
-    DictionaryError, MAX_MODES, MAX_RESOLUTION, Source, check_size, known_shape, scales_name,
+    DictionaryError, MAX_MODES, MAX_RESOLUTION, Source, check_size, known_shape,
 };
 use crate::modular::path::frame_of_heading;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_core::storage::{Storage, StoredMatrix, StoredSection, read_stored};
+use mrt_core::storage::{Storage, StoredMatrix};
 
 /// Shapes that version 1 knows.
 const SHAPE_COUNT: usize = 6;
@@ -39,20 +39,20 @@ pub(super) fn read<'a>(
     let receiver_texels = 5 * resolution * resolution;
     let kind = OperatorKind::Lightfield;
     let dropped = source.numbers("dropped", 2)?;
-    let left = source.old_matrix(kind, "left", [fields, fields])?;
-    let right = source.old_matrix(kind, "right", [fields, fields])?;
+    let left = source.matrix(kind, "left", [fields, fields])?;
+    let right = source.matrix(kind, "right", [fields, fields])?;
     let identity = source.owned(kind, fields, fields, |i, j| if i == j { 1.0 } else { 0.0 })?;
     let lightfields = LightfieldOperators {
         parity: mirror_parity(&left, &right)?,
         from_emission: identity,
-        straight: source.old_matrix(kind, "straight", [fields, fields])?,
+        straight: source.matrix(kind, "straight", [fields, fields])?,
         left,
         exchange: StoredMatrix::empty(0, fields),
         holes: Vec::new(),
-        response_from_lightfield: source.old_matrix(kind, "T_rlf_r", [responses, fields])?,
+        response_from_lightfield: source.matrix(kind, "T_rlf_r", [responses, fields])?,
         dropped_energy: dropped[0],
     };
-    let response_basis = source.old_matrix(
+    let response_basis = source.matrix(
         OperatorKind::ResponseSource,
         "U_r",
         [receiver_texels, responses],
@@ -90,24 +90,6 @@ pub(super) fn read<'a>(
 }
 
 impl<'a> Source<'a, '_, '_> {
-    fn old_matrix(
-        &mut self,
-        kind: OperatorKind,
-        section: &str,
-        [rows, columns]: [usize; 2],
-    ) -> Result<StoredMatrix<'a>, DictionaryError> {
-        self.check_length(section, rows * columns)?;
-        let section = StoredSection {
-            values: section,
-            // This version had none: other types than F32 are refused for want of it.
-            scales: &scales_name(section),
-            rows,
-            columns,
-            modes: kind.modes(),
-        };
-        Ok(read_stored(self.container, &section, self.budget)?)
-    }
-
     /// A matrix that the file does not hold.
     fn owned(
         &mut self,
@@ -178,13 +160,10 @@ fn read_shape<'a>(
     let shape = known_shape(index, source.container.text(&section("name"))?)?;
     // Names that came later are as unknown here as made-up ones.
     if !opens_sideways(shape) {
+        let names: Vec<&str> = SHAPES[..SHAPE_COUNT].iter().map(|s| s.name).collect();
         return Err(DictionaryError::UnknownShape {
             index,
-            expected: SHAPES[..SHAPE_COUNT]
-                .iter()
-                .map(|shape| shape.name)
-                .collect::<Vec<_>>()
-                .join(", "),
+            expected: names.join(", "),
             found: shape.name.to_owned(),
         });
     }
@@ -193,26 +172,13 @@ fn read_shape<'a>(
     let texels = shape.texel_count(resolution);
     let responses = response_basis.columns();
     let joint_modes = modes + shape.openings.len() * responses;
-    let own = source.old_matrix(OperatorKind::JointBasis, &section("U_b"), [texels, modes])?;
-    let rows: Vec<Vec<usize>> = shape
-        .openings
-        .iter()
-        .map(|opening| receiver_texels(shape, opening.face, resolution))
-        .collect();
-    let joint_basis = source.owned(
-        OperatorKind::JointBasis,
-        texels,
-        joint_modes,
-        |i, j| match j.checked_sub(modes) {
-            None => own.get(i, j),
-            Some(k) => response_basis.get(rows[k / responses][i], k % responses),
-        },
-    )?;
+    let own = source.matrix(OperatorKind::JointBasis, &section("U_b"), [texels, modes])?;
+    let joint_basis = joint_basis(source, shape, resolution, &own, response_basis)?;
     let mut openings = Vec::with_capacity(shape.openings.len());
     for m in 0..shape.openings.len() {
         let first = modes + m * responses;
         openings.push(OpeningOperators {
-            emission_from_coefficients: vec![source.old_matrix(
+            emission_from_coefficients: vec![source.matrix(
                 OperatorKind::Emission,
                 &section(&format!("R{m}")),
                 [fields, modes],
@@ -227,7 +193,7 @@ fn read_shape<'a>(
     }
     Ok(ShapeOperators {
         shape,
-        coefficients_from_direct: source.old_matrix(
+        coefficients_from_direct: source.matrix(
             OperatorKind::CoefficientsFromDirect,
             &section("T_d_b"),
             [modes, texels],
@@ -236,7 +202,7 @@ fn read_shape<'a>(
         probe_basis: StoredMatrix::empty(0, joint_modes),
         vector_basis: StoredMatrix::empty(0, joint_modes),
         openings,
-        implicit_lighting: source.old_matrix(
+        implicit_lighting: source.matrix(
             OperatorKind::ImplicitLighting,
             &section("L_imp"),
             [texels, modes],
@@ -245,6 +211,30 @@ fn read_shape<'a>(
         dropped_energy: source.numbers(&section("drop"), 1)?[0],
         // Nothing is projected: each response is a joint coefficient.
         joint_dropped_energy: 0.0,
+    })
+}
+
+/// Columns of `U_b`, then for each opening those of `U_r` as light through it meets the walls.
+fn joint_basis<'a>(
+    source: &mut Source<'a, '_, '_>,
+    shape: &Shape,
+    resolution: usize,
+    own: &StoredMatrix,
+    response_basis: &StoredMatrix,
+) -> Result<StoredMatrix<'a>, DictionaryError> {
+    let (modes, responses) = (own.columns(), response_basis.columns());
+    let rows: Vec<Vec<usize>> = shape
+        .openings
+        .iter()
+        .map(|opening| receiver_texels(shape, opening.face, resolution))
+        .collect();
+    let columns = modes + shape.openings.len() * responses;
+    let kind = OperatorKind::JointBasis;
+    source.owned(kind, own.rows(), columns, |i, j| {
+        match j.checked_sub(modes) {
+            None => own.get(i, j),
+            Some(k) => response_basis.get(rows[k / responses][i], k % responses),
+        }
     })
 }
 

@@ -1,12 +1,12 @@
 //! Bounces: which blocks take part, and the stages of a pass over them.
 
-use crate::executor::{run_parts, task_count};
+use crate::executor::run_parts;
 use crate::modular::frame::config::{Bounces, FrameConfig, MAX_PASSES};
 use crate::modular::frame::flux_limit::limit_flux;
 use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::report::FrameWork;
 use crate::modular::frame::schedule::{Kept, Schedule};
-use crate::modular::frame::split::{Cut, CutPlanes, part_of, span};
+use crate::modular::frame::split::{Cut, CutPlanes, parts_of};
 use crate::modular::frame::stage_clock::{Stage, StageClock};
 use crate::modular::frame::surface::Surface;
 use crate::modular::frame::tasks::{Receivers, Senders, Unfolding};
@@ -186,29 +186,21 @@ impl BounceStage<'_> {
             has_coefficients,
             ..
         } = &mut *self.schedule;
-        let (list, tasks) = (
-            &*sources,
-            task_count(executor, sources.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(sources, executor, &mut self.light.scratch);
         let mut coefficients = Cut::new(&mut self.light.coefficients, size);
         let mut flags = Cut::new(has_coefficients, 1);
         let mut state = Cut::new(state, 1);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            Some(Senders {
-                scene,
-                surface,
-                list,
-                first: span.start,
-                direct,
-                indirect: reflects_indirect.then_some(indirect),
-                coefficients: coefficients.take(span.clone()),
-                flags: flags.take(span.clone()),
-                state: state.take(span),
-                scratch: scratch.next()?,
-            })
+        let parts = parts.map(|part| Senders {
+            scene,
+            surface,
+            list: part.list,
+            first: part.span.start,
+            direct,
+            indirect: reflects_indirect.then_some(indirect),
+            coefficients: coefficients.take(part.span.clone()),
+            flags: flags.take(part.span.clone()),
+            state: state.take(part.span),
+            scratch: part.scratch,
         });
         run_parts(executor, parts, |part| level.run(part));
     }
@@ -229,29 +221,21 @@ impl BounceStage<'_> {
         } = &mut *self.schedule;
         let has_coefficients = &*has_coefficients;
         let all_lit = *lit == has_coefficients.len();
-        let (list, tasks) = (
-            &*targets,
-            task_count(executor, targets.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(targets, executor, &mut self.light.scratch);
         let mut joint = Cut::new(&mut self.light.joint, size);
         let mut state = Cut::new(state, 1);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            Some(Receivers {
-                scene,
-                list,
-                first: span.start,
-                coefficients,
-                has_coefficients,
-                all_lit,
-                gate_values,
-                keep_within,
-                joint: joint.take(span.clone()),
-                state: state.take(span),
-                scratch: scratch.next()?,
-            })
+        let parts = parts.map(|part| Receivers {
+            scene,
+            list: part.list,
+            first: part.span.start,
+            coefficients,
+            has_coefficients,
+            all_lit,
+            gate_values,
+            keep_within,
+            joint: joint.take(part.span.clone()),
+            state: state.take(part.span),
+            scratch: part.scratch,
         });
         run_parts(executor, parts, |part| level.run(part));
     }
@@ -265,28 +249,22 @@ impl BounceStage<'_> {
         // After one bounce, changes are not needed.
         let compare = self.schedule.kept != Kept::Once;
         let Schedule { targets, state, .. } = &mut *self.schedule;
-        let (list, tasks) = (
-            &*targets,
-            task_count(executor, targets.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(targets, executor, &mut self.light.scratch);
         let mut state = Cut::new(state, 1);
         let mut planes = CutPlanes::new(&mut self.light.indirect);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            let slots = scene.layout.slots_of_span(&span);
-            Some(Unfolding {
+        let parts = parts.map(|part| {
+            let slots = scene.layout.slots_of_span(&part.span);
+            Unfolding {
                 scene,
-                list,
-                first: span.start,
+                list: part.list,
+                first: part.span.start,
                 first_slot: slots.start,
                 joint,
                 compare,
-                state: state.take(span),
+                state: state.take(part.span),
                 planes: planes.take(slots),
-                scratch: scratch.next()?,
-            })
+                scratch: part.scratch,
+            }
         });
         run_parts(executor, parts, |part| level.run(part));
     }

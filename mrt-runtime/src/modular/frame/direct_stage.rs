@@ -1,6 +1,6 @@
 //! Direct light: only for blocks whose light may have changed.
 
-use crate::executor::{run_parts, task_count};
+use crate::executor::run_parts;
 use crate::light::beam::{Beam, BeamTracer};
 use crate::light::direct_light::add_beam::{TexelPlanes, add_beam};
 use crate::light::direct_light::{Shadows, add_exact, irradiance};
@@ -9,7 +9,7 @@ use crate::light::placed::PlacedLight;
 use crate::light::visibility::{Openings, Receiver, Visibility};
 use crate::modular::frame::config::FrameConfig;
 use crate::modular::frame::schedule::Schedule;
-use crate::modular::frame::split::{CutPlanes, part_of, span};
+use crate::modular::frame::split::{Cut, CutPlanes, parts_of};
 use crate::modular::scene::SceneData;
 use crate::output::texel_layout::{BlockRank, Planes};
 use glam::Vec3;
@@ -286,35 +286,25 @@ impl DirectStage {
         direct: &mut Planes,
     ) {
         let executor = &*job.config.executor;
-        let tasks = task_count(executor, self.list.len()).min(self.scratch.len());
         let mut planes = CutPlanes::new(direct);
-        let mut found = &mut self.found[..];
-        let mut gone = 0;
-        let mut scratch = self.scratch.iter_mut();
+        let mut found = Cut::new(&mut self.found, 1);
         let layout = &job.scene.layout;
-        let list = &self.list;
         let beams = LitBlocks {
             lights: &self.now,
             beams: &self.beams,
             hits: &self.hits,
         };
-        let parts = (0..tasks)
-            .map_while(|k| part_of(list, tasks, k).filter(|list| !list.is_empty()))
-            .filter_map(|list| {
-                let span = span(list);
-                let slots = layout.slots_of_span(&span);
-                let (_, rest) = std::mem::take(&mut found).split_at_mut(span.start - gone);
-                let (taken, rest) = rest.split_at_mut(span.len());
-                (found, gone) = (rest, span.end);
-                Some((list, taken, planes.take(slots), scratch.next()?))
-            });
-        run_parts(executor, parts, |(list, found, mut planes, scratch)| {
-            let span = span(list);
-            let first_slot = layout.slots[span.start].start;
-            for &block in list {
+        let parts = parts_of(&self.list, executor, &mut self.scratch).map(|part| {
+            let planes = planes.take(layout.slots_of_span(&part.span));
+            let found = found.take(part.span.clone());
+            (part, found, planes)
+        });
+        run_parts(executor, parts, |(part, found, mut planes)| {
+            let first_slot = layout.slots[part.span.start].start;
+            for &block in part.list {
                 let slots = layout.slots(block);
                 let count = slots.len();
-                let new = &mut scratch[..3 * count];
+                let new = &mut part.scratch[..3 * count];
                 if by_beams {
                     beams.light_block(job, block, new);
                 } else {
@@ -328,7 +318,7 @@ impl DirectStage {
                     result.change = result.change.max(channel.change);
                     result.peak = result.peak.max(channel.peak);
                 }
-                found[block.get() - span.start] = result;
+                found[block.get() - part.span.start] = result;
             }
         });
     }

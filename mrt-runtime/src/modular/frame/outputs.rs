@@ -21,6 +21,16 @@ pub(super) struct OutputBuffers {
     pub vector: Vec<f32>,
 }
 
+/// The last part of a frame: from light at texels and joint coefficients to outputs.
+pub(super) struct OutputStage<'a> {
+    pub scene: &'a SceneData,
+    pub config: &'a FrameConfig,
+    pub schedule: &'a mut Schedule,
+    pub light: &'a mut LightBuffers,
+    pub report: &'a mut ReportData,
+    pub clock: &'a mut StageClock,
+}
+
 impl OutputBuffers {
     /// Darkness in everything asked for that the dictionary was baked with.
     pub(super) fn new(scene: &SceneData, config: &FrameConfig) -> Self {
@@ -53,15 +63,15 @@ impl OutputBuffers {
     }
 
     /// Brings everything up to date for the blocks that changed, and lists them.
-    pub(super) fn fill(
-        &mut self,
-        scene: &SceneData,
-        config: &FrameConfig,
-        schedule: &mut Schedule,
-        light: &mut LightBuffers,
-        report: &mut ReportData,
-        clock: &mut StageClock,
-    ) {
+    pub(super) fn fill(&mut self, stage: OutputStage<'_>) {
+        let OutputStage {
+            scene,
+            config,
+            schedule,
+            light,
+            report,
+            clock,
+        } = stage;
         schedule.changed.sort_unstable();
         let changed = &schedule.changed;
         let order = &scene.layout.order;

@@ -51,6 +51,37 @@ struct Mirror {
     joint: Vec<bool>,
 }
 
+impl Mirror {
+    /// `None` if the texels' areas or a mode of the operators do not have the mirror.
+    fn of_operators(
+        is_up: bool,
+        permutation: Vec<u32>,
+        (coefficients, joint): (&Matrix<f32>, &Matrix<f32>),
+        areas: &[f32],
+    ) -> Option<Self> {
+        let area = |k: usize| areas.get(k).copied().unwrap_or(1.0);
+        let has_same_areas = (0..joint.rows()).all(|k| {
+            let other = area(permutation[k] as usize);
+            (area(k) - other).abs() <= SYMMETRY_TOLERANCE * other
+        });
+        if !has_same_areas {
+            return None;
+        }
+        let coefficients = (0..coefficients.rows())
+            .map(|mode| parity(&permutation, |texel| coefficients[(mode, texel)]))
+            .collect::<Option<_>>()?;
+        let joint = (0..joint.columns())
+            .map(|mode| parity(&permutation, |texel| joint[(texel, mode)]))
+            .collect::<Option<_>>()?;
+        Some(Self {
+            is_up,
+            permutation,
+            coefficients,
+            joint,
+        })
+    }
+}
+
 /// The class of each mode of a shape's operators.
 #[derive(Clone, Debug)]
 pub(crate) struct Classes {
@@ -72,34 +103,17 @@ impl Folding {
             coefficients: vec![0; coefficients.rows()],
             joint: vec![0; joint.columns()],
         };
-        let mut found: Vec<Mirror> = Vec::new();
         let candidates = if shape.tube().is_some() {
             Vec::new()
         } else {
             mirrors(shape)
         };
-        for map in candidates {
+        let mirror = |map| {
             let permutation = texel_permutation(shape, resolution, map);
-            let area = |k: usize| areas.get(k).copied().unwrap_or(1.0);
-            let same_areas = (0..texels).all(|k| {
-                let other = area(permutation[k] as usize);
-                (area(k) - other).abs() <= SYMMETRY_TOLERANCE * other
-            });
-            let coefficients: Option<Vec<bool>> = (0..coefficients.rows())
-                .map(|mode| parity(&permutation, |texel| coefficients[(mode, texel)]))
-                .collect();
-            let joint: Option<Vec<bool>> = (0..joint.columns())
-                .map(|mode| parity(&permutation, |texel| joint[(texel, mode)]))
-                .collect();
-            if let (true, Some(coefficients), Some(joint)) = (same_areas, coefficients, joint) {
-                found.push(Mirror {
-                    is_up: map == CubeSymmetry::mirror(1),
-                    permutation,
-                    coefficients,
-                    joint,
-                });
-            }
-        }
+            let is_up = map == CubeSymmetry::mirror(1);
+            Mirror::of_operators(is_up, permutation, (coefficients, joint), areas)
+        };
+        let found: Vec<Mirror> = candidates.into_iter().filter_map(mirror).collect();
         let folded = |subset: usize| {
             let bits = (0..found.len()).filter(move |k| subset >> k & 1 == 1);
             let permutations = bits.clone().map(|k| &found[k].permutation[..]).collect();

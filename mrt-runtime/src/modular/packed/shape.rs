@@ -141,6 +141,41 @@ pub struct Operators<'a> {
     pub areas: &'a [f32],
 }
 
+impl Operators<'_> {
+    /// The largest number of a joint mode in all bases; 0 if there is no such mode.
+    fn peak(&self, mode: usize) -> f32 {
+        [self.joint_basis, self.probe_basis, self.vector_basis]
+            .into_iter()
+            .filter(|basis| mode < basis.columns())
+            .flat_map(|basis| basis.column(mode))
+            .fold(0.0f32, |m, x| m.max(x.abs()))
+    }
+}
+
+/// The joint basis: tile after tile of orbits, in a tile one column for each mode, class after class.
+fn joint_tiles(
+    folding: &Folding,
+    order: &RowOrder,
+    basis: &Matrix<f32>,
+    scales: &[f32],
+    storage: Storage,
+) -> PackedNumbers {
+    let mut numbers = PackedNumbers::new(storage);
+    for tile in (0..folding.stride).step_by(TILE) {
+        for rows in &order.classes {
+            for &mode in &order.mode_of_row[rows.clone()] {
+                let mode = usize::from(mode);
+                for orbit in tile..tile + TILE {
+                    let texel = folding.first(orbit);
+                    let value = texel.map_or(0.0, |texel| basis[(texel, mode)]);
+                    numbers.push(value, scales[mode]);
+                }
+            }
+        }
+    }
+    numbers
+}
+
 impl PackedShape {
     pub(crate) fn new(
         shape: &Shape,
@@ -152,18 +187,7 @@ impl PackedShape {
         let (folding, classes) = Folding::new(shape, resolution, t, j, operators.areas);
         let order = RowOrder::new(&folding, &classes.joint);
         let scales = scales(j, storage);
-        let mut joint = PackedNumbers::new(storage);
-        for tile in (0..folding.stride).step_by(TILE) {
-            for rows in &order.classes {
-                for &mode in &order.mode_of_row[rows.clone()] {
-                    let mode = usize::from(mode);
-                    for orbit in tile..tile + TILE {
-                        let value = folding.first(orbit).map_or(0.0, |texel| j[(texel, mode)]);
-                        joint.push(value, scales[mode]);
-                    }
-                }
-            }
-        }
+        let joint = joint_tiles(&folding, &order, j, &scales, storage);
         let norm =
             |values: &mut dyn Iterator<Item = f32>| values.map(|x| x * x).sum::<f32>().sqrt();
         let joint_norms: Vec<f32> = (0..j.columns())
@@ -172,14 +196,7 @@ impl PackedShape {
         let units: Vec<f32> = joint_norms.iter().map(|&n| power_of_two(n)).collect();
         let inverse = |&mode: &u16| units.get(usize::from(mode)).map_or(0.0, |unit| 1.0 / unit);
         let row_inverses = order.mode_of_row.iter().map(inverse).collect();
-        let peak = |&mode: &u16| {
-            let mode = usize::from(mode);
-            [j, operators.probe_basis, operators.vector_basis]
-                .into_iter()
-                .filter(|basis| mode < basis.columns())
-                .flat_map(|basis| basis.column(mode))
-                .fold(0.0f32, |m, x| m.max(x.abs()))
-        };
+        let peak = |&mode: &u16| operators.peak(usize::from(mode));
         let peaks = order.mode_of_row.iter().map(peak).collect();
         let area = folding.weight.iter().sum::<f32>() * folding.elements() as f32;
         let coefficient_norms = (0..t.rows())
@@ -341,46 +358,19 @@ fn coefficient_rows(
     t: &Matrix<f32>,
     storage: Storage,
 ) -> (PackedNumbers, Vec<Group>) {
-    let rows = (0u16..).zip(&order.mode_of_row);
-    let own: Vec<(u16, usize)> = rows
-        .map(|(row, &mode)| (row, usize::from(mode)))
-        .filter(|&(_, mode)| mode < t.rows())
-        .collect();
-    let class = |mode: usize| classes.coefficients[mode];
-    let neighbours =
-        |a: &(u16, usize), b: &(u16, usize)| b.0 == a.0 + 1 && class(a.1) == class(b.1);
-    // Few rows of a class do better in company, though each then needs light of its own.
-    let mut lonely: Vec<(u16, usize)> = Vec::new();
-    let mut members: Vec<Vec<(u16, usize)>> = Vec::new();
-    for run in own.chunk_by(neighbours) {
-        let (full, rest) = run.split_at(run.len() / DOT_ROWS * DOT_ROWS);
-        members.extend(full.chunks(DOT_ROWS).map(<[_]>::to_vec));
-        if rest.len() > FEW_ROWS {
-            members.push(rest.to_vec());
-        } else {
-            lonely.extend(rest);
-        }
-    }
-    members.extend(lonely.chunks(DOT_ROWS).map(<[_]>::to_vec));
-    // Those of one class write some rows more than they have, so in ascending order, and before the mixed ones.
-    let are_mixed = |members: &[(u16, usize)]| {
-        let alike = |pair: &[(u16, usize)]| neighbours(&pair[0], &pair[1]);
-        !members.windows(2).all(alike)
-    };
-    members.sort_by_key(|members| (are_mixed(members), members[0].0));
     let mut numbers = PackedNumbers::new(storage);
     let mut groups = Vec::new();
-    for members in members {
+    for members in grouped_rows(order, classes, t.rows()) {
         let is_mixed = are_mixed(&members);
         let mut group = Group {
             is_mixed,
             ..Group::default()
         };
-        // Mixed groups are always full: the last row again.
+        // Kernels take mixed groups as full: the last row fills them up.
         let count = if is_mixed { DOT_ROWS } else { members.len() };
         group.count = count as u8;
         for k in 0..count {
-            let (row, mode) = members[k.min(members.len() - 1)];
+            let GroupRow { row, mode, class } = members[k.min(members.len() - 1)];
             let value = |orbit: usize| {
                 let texel = folding.first(orbit)?;
                 Some(t[(mode, texel)] * folding.multiplicity[orbit])
@@ -394,12 +384,62 @@ fn coefficient_rows(
             for orbit in orbits {
                 numbers.push(value(orbit).unwrap_or(0.0), scale);
             }
-            (group.rows[k], group.classes[k], group.scales[k]) = (row, class(mode), scale);
+            (group.rows[k], group.classes[k], group.scales[k]) = (row, class, scale);
         }
         groups.push(group);
     }
     (numbers, groups)
 }
 
-/// Rows of one class that are too few for a group.
+/// A row that a coefficient b has.
+#[derive(Clone, Copy)]
+struct GroupRow {
+    row: u16,
+    mode: usize,
+    class: u8,
+}
+
+impl GroupRow {
+    /// True if `next` is the next row, and of the same class.
+    fn is_followed_by(&self, next: &GroupRow) -> bool {
+        next.row == self.row + 1 && next.class == self.class
+    }
+}
+
+/// Whether rows are not consecutive rows of one class.
+fn are_mixed(rows: &[GroupRow]) -> bool {
+    !rows.windows(2).all(|pair| pair[0].is_followed_by(&pair[1]))
+}
+
+/// The rows of coefficients b in groups of up to [`DOT_ROWS`]. Groups of one class come first, in ascending order: kernels write
+/// zeros to the rows after a group that is not full, and those rows get their values from later groups.
+fn grouped_rows(order: &RowOrder, classes: &Classes, modes: usize) -> Vec<Vec<GroupRow>> {
+    let rows = (0u16..).zip(&order.mode_of_row);
+    let own: Vec<GroupRow> = rows
+        .map(|(row, &mode)| (row, usize::from(mode)))
+        .filter(|&(_, mode)| mode < modes)
+        .map(|(row, mode)| GroupRow {
+            row,
+            mode,
+            class: classes.coefficients[mode],
+        })
+        .collect();
+    // A mixed group needs folded light of several classes, but fewer rows of padding than several groups of few rows.
+    let mut few: Vec<GroupRow> = Vec::new();
+    let mut groups: Vec<Vec<GroupRow>> = Vec::new();
+    for run in own.chunk_by(GroupRow::is_followed_by) {
+        let (full, rest) = run.split_at(run.len() / DOT_ROWS * DOT_ROWS);
+        groups.extend(full.chunks(DOT_ROWS).map(<[_]>::to_vec));
+        if rest.len() > FEW_ROWS {
+            groups.push(rest.to_vec());
+        } else {
+            few.extend(rest);
+        }
+    }
+    groups.extend(few.chunks(DOT_ROWS).map(<[_]>::to_vec));
+    groups.sort_by_key(|rows| (are_mixed(rows), rows[0].row));
+    groups
+}
+
+/// Up to this many rows of one class are too few for a group of their own.
 const FEW_ROWS: usize = 2;

@@ -88,7 +88,22 @@ impl<M> Walk<'_, M> {
         self.blocks[self.source.get()].shape.openings[self.opening].face
     }
 
-    /// Goes on through a face of the block that a path has reached.
+    /// Position of a word in the table; `None` where the table ends. An error if the word was packed away.
+    fn position(self, word: &Word) -> Result<Option<usize>, AssembleError> {
+        let entries = &self.paths.entries;
+        let found = entries.binary_search_by(|entry| entry.word.cmp(word));
+        if found.is_err() && self.paths.whole_table_has(word) {
+            let source = self.source.get();
+            return Err(AssembleError::MissingPath {
+                block: source,
+                face: self.blocks[source].orientation.face(self.first()),
+                word: word.name(),
+            });
+        }
+        Ok(found.ok())
+    }
+
+    /// Continues a path through a face of the block that it has reached.
     fn cross(
         self,
         exit: Face,
@@ -105,43 +120,20 @@ impl<M> Walk<'_, M> {
             return Ok(());
         };
         let first = self.first();
-        let heading = path.source_from_here.face(exit);
-        let (mut x, mut y) = (path.x, path.y);
-        let letter = if heading == first {
-            Face::PosZ
-        } else if x.is_none() || x == Some(heading) {
-            x = Some(heading);
-            Face::PosX
-        } else {
-            y = Some(heading);
-            Face::PosY
-        };
-        let hole = here.shape.opening(exit).and_then(|o| hole_of(o.outline));
-        let word = path.word.then(Crossing {
-            heading: letter,
-            hole,
-        });
-        let entries = &self.paths.entries;
-        let Ok(index) = entries.binary_search_by(|entry| entry.word.cmp(&word)) else {
-            return if self.paths.whole_table_has(&word) {
-                Err(AssembleError::MissingPath {
-                    block: self.source.get(),
-                    face: self.blocks[self.source.get()].orientation.face(first),
-                    word: word.name(),
-                })
-            } else {
-                Ok(())
-            };
-        };
-        let next = Path {
-            word,
+        let mut next = Path {
             block,
             entered,
             source_from_here: compose(path.source_from_here, here_from_there),
-            x,
-            y,
             doors: with_door(&path.doors, here.doors[exit.index()]),
-            factor: path.factor,
+            ..path.clone()
+        };
+        let heading = path.source_from_here.face(exit);
+        next.word = path.word.then(Crossing {
+            heading: next.letter(heading, first),
+            hole: here.shape.opening(exit).and_then(|o| hole_of(o.outline)),
+        });
+        let Some(index) = self.position(&next.word)? else {
+            return Ok(());
         };
         visit(index, &next);
         if next.word.crossings().len() >= self.max_depth {
@@ -162,6 +154,22 @@ impl<M> Walk<'_, M> {
             }
         }
         Ok(())
+    }
+}
+
+impl Path {
+    /// The heading, in the word, of a crossing with a heading in the source's frame. A heading that no crossing had before becomes
+    /// the word's x or y.
+    fn letter(&mut self, heading: Face, first: Face) -> Face {
+        if heading == first {
+            Face::PosZ
+        } else if self.x.is_none() || self.x == Some(heading) {
+            self.x = Some(heading);
+            Face::PosX
+        } else {
+            self.y = Some(heading);
+            Face::PosY
+        }
     }
 }
 
