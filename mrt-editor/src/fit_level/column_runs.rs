@@ -12,21 +12,22 @@ pub struct Run {
     pub rows: Range<usize>,
     /// Height of the surface below, metres.
     pub floor: f64,
-    /// Height of the surface above, metres; the highest free voxel's top under the open sky.
+    /// Height of the surface above, metres; under the open sky the top of the highest free voxel.
     pub ceiling: f64,
 }
 
 /// All runs, column by column.
 #[derive(Clone, Debug)]
-pub struct Columns {
-    /// Columns along x and z.
+pub struct ColumnRuns {
+    /// Number of columns along x and z.
     pub count: [usize; 2],
     /// Sorted by z, then x, then height.
     pub runs: Vec<Run>,
+    /// The runs of column k are `starts[k]..starts[k + 1]`.
     starts: Vec<usize>,
 }
 
-impl Columns {
+impl ColumnRuns {
     /// Finds the runs that are at least `headroom` metres high.
     pub fn new(space: &FreeSpace, headroom: f64) -> Self {
         let grid = &space.grid;
@@ -38,25 +39,11 @@ impl Columns {
         };
         for z in 0..count[1] {
             for x in 0..count[0] {
-                let mut y = 0;
-                while y < grid.count[1] {
-                    let first = y;
-                    while y < grid.count[1] && space.free[grid.index([x, y, z])] {
-                        y += 1;
-                        let last = grid.index([x, y - 1, z]);
-                        if y < grid.count[1] && !space.is_linked(last, 1) {
-                            break;
-                        }
-                    }
-                    if y == first {
-                        y += 1;
-                        continue;
-                    }
-                    let run = run_of(space, [x, z], first..y);
-                    if run.ceiling - run.floor >= headroom {
-                        columns.runs.push(run);
-                    }
-                }
+                let runs = rows_of_runs(space, [x, z])
+                    .into_iter()
+                    .map(|rows| run_of(space, [x, z], rows))
+                    .filter(|run| run.ceiling - run.floor >= headroom);
+                columns.runs.extend(runs);
                 columns.starts.push(columns.runs.len());
             }
         }
@@ -69,8 +56,8 @@ impl Columns {
         self.starts[column]..self.starts[column + 1]
     }
 
-    /// Height above which half of the free volume lies in higher runs: what a person would call the
-    /// rooms' height. `None` without a run.
+    /// The rooms' height as a person would call it, metres: half of the free volume is in runs up to this height. `None`
+    /// without runs.
     pub fn typical_height(&self) -> Option<f64> {
         let mut heights: Vec<f64> = self.runs.iter().map(|r| r.ceiling - r.floor).collect();
         heights.sort_by(f64::total_cmp);
@@ -83,8 +70,32 @@ impl Columns {
     }
 }
 
-/// Takes floor and ceiling from the surfaces, but never further than a voxel beyond the free ones:
-/// where the free space ends without a surface, the next one can be anywhere.
+/// Stretches of free voxels of a column that nothing cuts, from the lowest.
+fn rows_of_runs(space: &FreeSpace, [x, z]: [usize; 2]) -> Vec<Range<usize>> {
+    let grid = &space.grid;
+    let height = grid.count[1];
+    let mut runs = Vec::new();
+    let mut y = 0;
+    while y < height {
+        let first = y;
+        while y < height && space.free[grid.index([x, y, z])] {
+            y += 1;
+            let last = grid.index([x, y - 1, z]);
+            if y < height && !space.is_linked(last, 1) {
+                break;
+            }
+        }
+        if y > first {
+            runs.push(first..y);
+        } else {
+            y += 1;
+        }
+    }
+    runs
+}
+
+/// Takes floor and ceiling from the surfaces, but from none more than a voxel beyond the free voxels: where the free space
+/// ends without a surface, the next surface can be anywhere.
 fn run_of(space: &FreeSpace, column: [usize; 2], rows: Range<usize>) -> Run {
     let grid = &space.grid;
     let at = |y: usize| grid.index([column[0], y, column[1]]);
