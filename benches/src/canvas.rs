@@ -10,11 +10,8 @@ use embedded_graphics::mono_font::{MonoFont, MonoTextStyle};
 use embedded_graphics::pixelcolor::{Rgb888, RgbColor};
 use embedded_graphics::prelude::DrawTarget;
 use embedded_graphics::text::{Alignment, Baseline, Text, TextStyleBuilder};
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-use mrt_core::container::write_file_atomically;
 use mrt_editor::render::Picture;
-use mrt_editor::render::file::WriteError;
+use mrt_editor::render::file::{Saves, WriteError, write_png};
 use mrt_editor::render::tone::tone_map;
 use std::convert::Infallible;
 use std::path::Path;
@@ -261,20 +258,12 @@ impl Canvas {
     /// # Errors
     /// [`WriteError`].
     pub fn write(&self, path: &Path) -> Result<usize, WriteError> {
-        let mut bytes = Vec::new();
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive)
-            .write_image(
-                self.pixels.as_flattened(),
-                self.width as u32,
-                self.height as u32,
-                ExtendedColorType::Rgb8,
-            )
-            .map_err(|source| WriteError::Encode {
-                path: path.to_owned(),
-                source,
-            })?;
-        write_file_atomically(path, &bytes)?;
-        Ok(bytes.len())
+        write_png(
+            path,
+            [self.width, self.height],
+            self.pixels.as_flattened(),
+            Saves::Bytes,
+        )
     }
 }
 

@@ -2,7 +2,6 @@
 //! read, mapped to blocks, lit through them, looked at and compared with references.
 
 pub mod import;
-pub mod receiver;
 pub mod fit_level;
 pub mod document;
 pub mod render;

@@ -6,15 +6,17 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::lighting::sampling::hash;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_dictionary::config::{Enrichment, PriorConfig};
-use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior, light_prior};
+use mrt_dictionary::modular::light_prior::basis::light_prior;
+use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior};
 use mrt_dictionary::modular::light_prior::warped::{
     warped_direct_samples, warped_light_radius, warped_prior_lights,
 };
 use mrt_dictionary::modular::one_bounce::cube::{
     Reconstruction, closed_cube_bounce, restrict_to_shape,
 };
-use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::one_bounce::warped::warped_bounce;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
+use mrt_dictionary::modular::surface::walls::warped::WarpedWalls;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
 use mrt_dictionary::progress::Progress;

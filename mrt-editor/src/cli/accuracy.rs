@@ -387,8 +387,8 @@ fn reference_signal(
     args: &AccuracyArgs,
 ) -> Result<Vec<f64>, ReferenceError> {
     let bounces = match args.bounces {
-        BouncesArg::First => mrt_core::reference::bounces::Bounces::First,
-        BouncesArg::All => mrt_core::reference::bounces::Bounces::All,
+        BouncesArg::First => mrt_core::reference::bounces::ReferenceBounces::First,
+        BouncesArg::All => mrt_core::reference::bounces::ReferenceBounces::All,
     };
     match reference.kind {
         Kind::IrradianceRgb { .. } => {

@@ -4,7 +4,7 @@ use crate::cli::dictionary_source::{SourceError, load};
 use crate::cli::reference_level::{LevelErrors, ReferenceLevelError, measure};
 use crate::cli::table::Table;
 use crate::render::camera::Camera;
-use crate::render::file::{WriteError, write_png};
+use crate::render::file::{Saves, WriteError, write_png};
 use crate::render::level_view::{LevelView, ViewError};
 use crate::render::tone::{auto_exposure, tone_map};
 use crate::render::{Picture, render};
@@ -298,7 +298,7 @@ fn take_pictures(
             let path = args.out.join(format!("{name}-{part}.png"));
             let mut srgb = tone_map(&picture, exposure);
             over_background(&mut srgb, &coverage);
-            write_png(&path, [width, height], &srgb)?;
+            write_png(&path, [width, height], &srgb, Saves::Time)?;
             written.push(path.display().to_string());
         }
     }

@@ -14,7 +14,6 @@ use crate::document::level_file::read_level;
 use crate::fit_level::paint::coverage;
 use crate::fit_level::surface::spread_points;
 use crate::import::read_scene;
-use crate::receiver::ReceiverMap;
 use crate::render::camera::Camera;
 use crate::render::lit::{LitScene, SphereLight};
 use crate::render::placement::{
@@ -27,6 +26,7 @@ use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::corner_normals;
 use mrt_dictionary::modular::variants::warp_error::guessed_error;
 use mrt_runtime::blocks::WarpTransport;
+use mrt_runtime::low_level::output::receiver::{ReceiverMap, unwrap_mesh};
 use mrt_runtime::shadows::Rays;
 use mrt_runtime::{AssembleConfig, Bounces, Frame, FrameConfig, FrameReport, Level, Light, Scene};
 use report::{Report, light_row};
@@ -101,7 +101,10 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     warn_of_warps(&level);
     let bvh = Bvh::build(mesh);
     let surroundings = Surroundings::new(mesh, &bvh, &level);
-    let receivers = ReceiverMap::with_mesh(&level, &bvh);
+    let receivers = ReceiverMap::with_cube_camera(&level, |origin, direction| {
+        let hit = bvh.closest_hit(origin, direction, f32::INFINITY);
+        hit.map_or(f32::INFINITY, |hit| hit.t)
+    });
     let covered = coverage(&level, &receivers, &spread_points(mesh, COVERAGE_POINTS)).near;
     if covered < LEAST_COVERAGE {
         return Err(LightCommandError::OtherMesh {
@@ -140,7 +143,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
         hides_outside: false,
     };
     let views = views(args, &lit, &level, &surroundings)?;
-    let unwrapped = crate::receiver::unwrap::unwrap(mesh, &receivers);
+    let unwrapped = unwrap_mesh(mesh, &receivers);
     let report = Report {
         mesh: imported.report,
         blocks: level.blocks.len(),
@@ -235,6 +238,7 @@ fn place_lights(
         if position.is_finite()
             && let Some((block, distance)) = receivers.nearest_block(position)
         {
+            let block = block.get();
             if distance > 1e-3 * width(block) {
                 return Err(LightCommandError::OutsideBlocks {
                     light: index,

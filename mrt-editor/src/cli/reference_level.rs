@@ -160,7 +160,7 @@ fn exact_irradiance(
         let direct = direct_quarters(exact, &light, DIRECT_SAMPLES);
         for channel in 0..3 {
             let albedo: Vec<f64> = albedo.iter().map(|a| f64::from(a[channel])).collect();
-            let bounces = mrt_core::reference::bounces::Bounces::Count(bounces);
+            let bounces = mrt_core::reference::bounces::ReferenceBounces::Count(bounces);
             let solved = solve(exact, transport, &direct, bounces, &albedo)?;
             for (texel, e) in solved.into_iter().enumerate() {
                 sum[3 * texel + channel] += e * f64::from(intensity[channel]);

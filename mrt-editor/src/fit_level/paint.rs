@@ -1,11 +1,11 @@
 //! Gives every wall of a level the mean albedo of the surfaces that receive their light from it.
 
 use super::surface::SurfacePoint;
-use crate::receiver::ReceiverMap;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_runtime::Level;
+use mrt_runtime::low_level::output::receiver::ReceiverMap;
 use serde::Serialize;
 
 /// A point is near a block within this share of the block's diagonal: walls of real rooms have niches,
@@ -45,7 +45,7 @@ fn distance_in_blocks(level: &Level, receivers: &ReceiverMap, point: &SurfacePoi
     receivers
         .nearest_block(point.position)
         .map_or(f64::INFINITY, |(block, distance)| {
-            distance / level.blocks[block].warp.diagonal()
+            distance / level.blocks[block.get()].warp.diagonal()
         })
 }
 
@@ -58,10 +58,12 @@ pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoin
         if distance_in_blocks(level, &receivers, point) > NEAR {
             continue;
         }
-        if let Some(receiver) = receivers.receiver(point.position, point.normal) {
+        if let Some(receiver) = receivers.receiver(point.position, point.normal)
+            && let Some(face) = receivers.turned_face(&receiver)
+        {
             let material = mesh.triangle_materials[point.triangle] as usize;
             let albedo = mesh.materials[material].albedo.as_dvec3();
-            let (sum, area) = &mut walls[receiver.block][receivers.turned_face(&receiver).index()];
+            let (sum, area) = &mut walls[receiver.block.get()][face.index()];
             *sum += albedo * point.area;
             *area += point.area;
         }

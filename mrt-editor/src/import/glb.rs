@@ -4,7 +4,8 @@
 //! without asking; its document model is validated and used for everything else. Textures are not
 //! read: a material's colour is `extras.meanBaseColorLinear` where given, else its base colour.
 
-use super::{ImportError, Paint, RawMesh};
+use super::error::ImportError;
+use super::raw_mesh::{Paint, RawMesh};
 use glam::{Mat4, Vec3};
 use gltf::accessor::{DataType, Dimensions};
 use std::path::Path;
@@ -20,12 +21,29 @@ const MAX_TRIANGLES: usize = 50_000_000;
 
 /// Reads a GLB.
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
-    let malformed = |place: String, expected| ImportError::Malformed {
+    read_mesh(bytes).map_err(|Fault { place, expected }| ImportError::Malformed {
         path: path.to_owned(),
         place,
         expected,
-    };
-    let header = || malformed("header".to_owned(), "a complete binary glTF 2.0 file");
+    })
+}
+
+/// A place in the file, and what should be there.
+#[derive(Debug)]
+struct Fault {
+    place: String,
+    expected: &'static str,
+}
+
+impl Fault {
+    fn at(place: impl Into<String>, expected: &'static str) -> Self {
+        let place = place.into();
+        Self { place, expected }
+    }
+}
+
+fn read_mesh(bytes: &[u8]) -> Result<RawMesh, Fault> {
+    let header = || Fault::at("header", "a complete binary glTF 2.0 file");
     // The library subtracts the header from this length unchecked.
     let length = bytes.get(8..12).map_or(0, |word| {
         u32::from_le_bytes([word[0], word[1], word[2], word[3]])
@@ -34,7 +52,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
         return Err(header());
     }
     let glb = gltf::binary::Glb::from_slice(bytes).map_err(|_| header())?;
-    let document = parse_document(&glb.json).map_err(|error| malformed(error, "valid glTF 2.0"))?;
+    let document = parse_document(&glb.json).map_err(|error| Fault::at(error, "valid glTF 2.0"))?;
     let mut reader = Reader {
         bin: glb.bin.as_deref().unwrap_or_default(),
         mesh: RawMesh::default(),
@@ -45,11 +63,9 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
     let scene = document
         .default_scene()
         .or_else(|| document.scenes().next())
-        .ok_or_else(|| malformed("scenes".to_owned(), "at least one scene"))?;
+        .ok_or_else(|| Fault::at("scenes", "at least one scene"))?;
     for node in scene.nodes() {
-        reader
-            .add_node(&node, Mat4::IDENTITY, 0)
-            .map_err(|(place, expected)| malformed(place, expected))?;
+        reader.add_node(&node, Mat4::IDENTITY, 0)?;
     }
     Ok(reader.mesh)
 }
@@ -112,8 +128,7 @@ fn read_paint(material: &gltf::Material<'_>) -> Paint {
     Paint::new(name, Some(mean.unwrap_or(Vec3::new(r, g, b))))
 }
 
-type Fault = (String, &'static str);
-
+/// Walks through the document and collects triangles.
 struct Reader<'a> {
     bin: &'a [u8],
     mesh: RawMesh,
@@ -124,9 +139,8 @@ impl Reader<'_> {
     fn add_node(&mut self, node: &gltf::Node<'_>, parent: Mat4, depth: usize) -> Result<(), Fault> {
         self.node_visits += 1;
         if depth > MAX_NODE_DEPTH || self.node_visits > MAX_NODE_VISITS {
-            let place = format!("node {}", node.index());
-            return Err((
-                place,
+            return Err(Fault::at(
+                format!("node {}", node.index()),
                 "nodes nested at most 256 deep, without cycles, and at most 1,000,000",
             ));
         }
@@ -152,7 +166,7 @@ impl Reader<'_> {
         };
         if accessor.data_type() != DataType::F32 || accessor.dimensions() != Dimensions::Vec3 {
             let place = format!("accessor {}", accessor.index());
-            return Err((place, "positions as three 32-bit floats"));
+            return Err(Fault::at(place, "positions as three 32-bit floats"));
         }
         let first = self.mesh.positions.len() as u32;
         let vertex_count = accessor.count();
@@ -173,22 +187,18 @@ impl Reader<'_> {
             .iter()
             .find(|&&index| index as usize >= vertex_count)
         {
-            return Err((
-                format!("index {bad}"),
-                "indices below the number of vertices",
-            ));
+            let place = format!("index {bad}");
+            return Err(Fault::at(place, "indices below the number of vertices"));
         }
         if self.mesh.triangles.len() + indices.len() / 3 > MAX_TRIANGLES {
-            return Err(("nodes".to_owned(), "at most 50,000,000 triangles"));
+            return Err(Fault::at("nodes", "at most 50,000,000 triangles"));
         }
         let material = primitive
             .material()
             .index()
             .unwrap_or(self.mesh.paints.len() - 1);
-        for corners in indices.chunks_exact(3) {
-            self.mesh
-                .triangles
-                .push([first + corners[0], first + corners[1], first + corners[2]]);
+        for corners in indices.as_chunks::<3>().0 {
+            self.mesh.triangles.push(corners.map(|k| first + k));
             self.mesh.triangle_materials.push(material as u32);
         }
         Ok(())
@@ -202,7 +212,7 @@ fn read_indices(bin: &[u8], accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, F
         DataType::U32 => 4,
         _ => {
             let place = format!("accessor {}", accessor.index());
-            return Err((place, "unsigned integer indices"));
+            return Err(Fault::at(place, "unsigned integer indices"));
         }
     };
     let little_endian = |bytes: &[u8]| {
@@ -220,7 +230,7 @@ fn elements<'a>(
     accessor: &gltf::Accessor<'_>,
     size: usize,
 ) -> Result<impl Iterator<Item = &'a [u8]>, Fault> {
-    let fault = |expected| (format!("accessor {}", accessor.index()), expected);
+    let fault = |expected| Fault::at(format!("accessor {}", accessor.index()), expected);
     if accessor.sparse().is_some() {
         return Err(fault("no sparse data"));
     }
@@ -241,4 +251,84 @@ fn elements<'a>(
     };
     let bytes = range().ok_or_else(|| fault("its data inside the file"))?;
     Ok((0..count).map(move |k| &bytes[k * stride..k * stride + size]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One triangle: three positions, then three indices of a byte each.
+    fn numbers() -> Vec<u8> {
+        let corners = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+        let positions = corners.iter().flat_map(|x| x.to_le_bytes());
+        positions.chain([0, 1, 2, 0]).collect()
+    }
+
+    /// A document around [`numbers`], with `changes` in it.
+    fn glb(changes: &[(&str, &str)]) -> Vec<u8> {
+        let mut json = r#"{"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],
+            "nodes":[{"translation":[0,0,5],"children":[1]},{"mesh":0,"scale":[2,2,2]}],
+            "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
+            "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.2,0.4,0.6,1]}}],
+            "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+            {"bufferView":0,"byteOffset":36,"componentType":5121,"count":3,"type":"SCALAR"}],
+            "bufferViews":[{"buffer":0,"byteLength":40}],"buffers":[{"byteLength":40}]}"#
+            .to_owned();
+        for (from, to) in changes {
+            assert!(json.contains(from), "{from}");
+            json = json.replacen(from, to, 1);
+        }
+        let chunk = |kind: &[u8; 4], bytes: &[u8]| {
+            let length = (bytes.len() as u32).to_le_bytes();
+            [&length[..], kind, bytes].concat()
+        };
+        let content = [chunk(b"JSON", json.as_bytes()), chunk(b"BIN\0", &numbers())].concat();
+        let length = (12 + content.len() as u32).to_le_bytes();
+        [b"glTF\x02\0\0\0", &length[..], &content].concat()
+    }
+
+    #[test]
+    fn triangles_stand_where_their_nodes_put_them() {
+        let mesh = read_mesh(&glb(&[])).expect("reads");
+        let corners = [[0.0, 0.0, 5.0], [2.0, 0.0, 5.0], [0.0, 2.0, 5.0]];
+        assert_eq!(mesh.positions, corners.map(Vec3::from_array));
+        assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        assert_eq!(mesh.paints[0].colour, Some(Vec3::new(0.2, 0.4, 0.6)));
+        let mean = r#"{"extras":{"meanBaseColorLinear":[0.1,0.2,0.3]},"pbrMetallicRoughness":{"#;
+        let mesh = read_mesh(&glb(&[(r#"{"pbrMetallicRoughness":{"#, mean)])).expect("reads");
+        assert_eq!(mesh.paints[0].colour, Some(Vec3::new(0.1, 0.2, 0.3)));
+    }
+
+    #[test]
+    fn every_index_and_offset_is_checked() {
+        for (from, to, place) in [
+            (r#""nodes":[0]"#, r#""nodes":[7]"#, "node 7"),
+            (r#""children":[1]"#, r#""children":[0]"#, "node 0"),
+            (r#""mesh":0"#, r#""mesh":9"#, "mesh 9"),
+            (r#""POSITION":0"#, r#""POSITION":9"#, "accessor 9"),
+            (r#""indices":1"#, r#""indices":0"#, "accessor 0"),
+            (r#""material":0"#, r#""material":5"#, "material 5"),
+            (r#""count":3"#, r#""count":0"#, "accessor 0"),
+            (r#""count":3"#, r#""count":4"#, "accessor 0"),
+            (r#""byteOffset":36"#, r#""byteOffset":38"#, "accessor 1"),
+            (r#""byteOffset":36"#, r#""byteOffset":1"#, "index"),
+            (r#""byteLength":40"#, r#""byteLength":41"#, "accessor 0"),
+            (r#""buffer":0"#, r#""buffer":1"#, "accessor 0"),
+            (
+                r#"[{"byteLength":40}]"#,
+                r#"[{"uri":"a.bin"}]"#,
+                "accessor 0",
+            ),
+            (r#""version":"2.0""#, r#""version":"1.0""#, "asset"),
+            (r#""scenes""#, r#""other""#, "scenes"),
+            (
+                r#""scenes""#,
+                r#""extensionsRequired":["DRACO"],"scenes""#,
+                "DRACO",
+            ),
+        ] {
+            let fault = read_mesh(&glb(&[(from, to)])).expect_err(to);
+            assert!(fault.place.contains(place), "{to}: {}", fault.place);
+        }
+    }
 }

@@ -5,7 +5,9 @@
 //! do materials of the faces, whose names it drops when their library is missing and which we need for
 //! made-up colours.
 
-use super::{ImportError, Paint, RawMesh};
+use super::error::ImportError;
+use super::file::read_library;
+use super::raw_mesh::{Paint, RawMesh};
 use glam::Vec3;
 use std::collections::HashMap;
 use std::io::{BufReader, Read};
@@ -144,7 +146,7 @@ impl<'a> ObjLines<'a> {
             }
             "mtllib" => {
                 let folder = self.path.parent().unwrap_or(Path::new(""));
-                if let Some(text) = super::read_beside(folder, rest.trim()) {
+                if let Some(text) = read_library(folder, rest.trim()) {
                     self.colours.extend(read_colours(&text));
                 }
                 String::new()

@@ -1,6 +1,8 @@
 //! Pictures as files, which are there whole or not at all.
 
 use super::Picture;
+use image::codecs::hdr::HdrEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use mrt_core::container::{ContainerError, write_file_atomically};
 use std::path::{Path, PathBuf};
@@ -29,38 +31,49 @@ pub enum WriteError {
     },
 }
 
-/// Writes 8-bit sRGB pixels as PNG.
+/// What the encoder of a PNG file saves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Saves {
+    /// Time: for pictures that are looked at and thrown away.
+    Time,
+    /// Bytes: for pictures that are kept.
+    Bytes,
+}
+
+/// Writes 8-bit sRGB pixels, row by row from the top, as PNG; returns the file's bytes.
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn write_png(path: &Path, size: [usize; 2], srgb: &[u8]) -> Result<(), WriteError> {
+pub fn write_png(
+    path: &Path,
+    [width, height]: [usize; 2],
+    srgb: &[u8],
+    saves: Saves,
+) -> Result<usize, WriteError> {
+    let compression = match saves {
+        Saves::Time => CompressionType::Fast,
+        Saves::Bytes => CompressionType::Best,
+    };
     let mut bytes = Vec::new();
-    image::codecs::png::PngEncoder::new(&mut bytes)
-        .write_image(
-            srgb,
-            size[0] as u32,
-            size[1] as u32,
-            ExtendedColorType::Rgb8,
-        )
+    PngEncoder::new_with_quality(&mut bytes, compression, FilterType::Adaptive)
+        .write_image(srgb, width as u32, height as u32, ExtendedColorType::Rgb8)
         .map_err(|source| WriteError::Encode {
             path: path.to_owned(),
             source,
         })?;
-    Ok(write_file_atomically(path, &bytes)?)
+    write_file_atomically(path, &bytes)?;
+    Ok(bytes.len())
 }
 
-/// Writes linear pixels as Radiance HDR.
+/// Writes linear pixels as Radiance HDR: each channel keeps 8 bits relative to the pixel's brightest one.
 ///
 /// # Errors
 /// [`WriteError`].
 pub fn write_hdr(path: &Path, picture: &Picture) -> Result<(), WriteError> {
     let mut bytes = Vec::new();
-    let pixels: Vec<image::Rgb<f32>> = picture
-        .pixels
-        .iter()
-        .map(|colour| image::Rgb(colour.to_array()))
-        .collect();
-    image::codecs::hdr::HdrEncoder::new(&mut bytes)
+    let pixels = picture.pixels.iter();
+    let pixels: Vec<_> = pixels.map(|colour| image::Rgb(colour.to_array())).collect();
+    HdrEncoder::new(&mut bytes)
         .encode(&pixels, picture.width, picture.height)
         .map_err(|source| WriteError::Encode {
             path: path.to_owned(),

@@ -1,12 +1,11 @@
 //! Colours of a mesh under sphere lights, with indirect light from a lightmap.
 
-use crate::receiver::{Blend, ReceiverMap};
 use glam::Vec3;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
-use mrt_runtime::BlockIndex;
 use mrt_runtime::low_level::output::lightmap_atlas::LightmapAtlas;
+use mrt_runtime::low_level::output::receiver::{Blend, ReceiverMap};
 use std::f32::consts::PI;
 
 /// Shadow rays to each light that are always cast.
@@ -113,8 +112,7 @@ impl LitScene<'_> {
 
     fn is_outside(&self, position: Vec3, normal: Vec3) -> bool {
         let blend = self.receivers.blended(position, normal, |_| false);
-        let lit: f64 = blend.parts().iter().map(|(_, weight)| weight).sum();
-        lit < 0.5
+        blend.total_weight() < 0.5
     }
 
     /// Irradiance straight from the lights, with soft shadows.
@@ -173,13 +171,13 @@ impl LitScene<'_> {
         self.blend(surface)
             .parts()
             .iter()
-            .filter_map(|(receiver, weight)| {
-                let (u, v) = (receiver.u as f32, receiver.v as f32);
-                let pixel =
-                    self.atlas
-                        .pixel(BlockIndex::new(receiver.block), receiver.face, u, v)?;
+            .filter_map(|part| {
+                let at = part.receiver;
+                let pixel = self
+                    .atlas
+                    .pixel(at.block, at.face, at.u as f32, at.v as f32)?;
                 let irradiance = self.atlas.sample(self.lightmap, pixel);
-                Some(Vec3::from_array(irradiance) * *weight as f32)
+                Some(Vec3::from_array(irradiance) * part.weight as f32)
             })
             .sum()
     }

@@ -40,6 +40,7 @@ use crate::output::lightmap::Lightmap;
 use crate::output::probe_order::PROBE_COEFFICIENTS;
 use crate::output::probes::{Probes, irradiance_from_probe};
 use glam::Vec3;
+use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::hemisphere_sh::evaluate_f32;
 use std::num::NonZero;
 
@@ -216,9 +217,11 @@ impl Frame {
         Some(self.surface.emission.get(slot))
     }
 
-    /// Goes on with another scene, such as the same level with blocks added or removed. Lights and their ids stay, and
-    /// light goes on where `old_block` names the block of the present scene that a block of the new one was, if both have
-    /// the same shape; all else starts dark, with the doors and colours of the new level.
+    /// Goes on with another scene, such as the same level with blocks added or removed. Lights and their ids stay.
+    ///
+    /// `old_block` names, for a block of the new scene, the block of the present scene that it was. Indirect light goes on
+    /// at the walls that both have: cubes that gain or lose an opening keep the light of their other walls, tubes must be
+    /// of the same shape. All else starts dark, with the doors and colours of the new level.
     ///
     /// Allocates the buffers of the new scene.
     pub fn change_scene(
@@ -229,31 +232,49 @@ impl Frame {
         let mut next = Frame::new(scene, self.config.clone());
         std::mem::swap(&mut next.lights, &mut self.lights);
         next.lights.place_in(&scene.level);
-        let (from, to) = (&self.scene, scene);
-        for (block, placed) in to.level.blocks.iter().enumerate() {
-            let block = BlockIndex::new(block);
-            let old = old_block(block).filter(|old| {
-                let old = from.level.block(*old);
-                old.is_some_and(|old| {
-                    old.shape == placed.shape && old.texels.len() == placed.texels.len()
-                })
-            });
-            let Some(old) = old else { continue };
-            let rank = to.layout.rank[block.get()];
-            let texel_of_slot = &to.layout.texel_of_slot[to.layout.shape(rank)];
-            for (slot, &texel) in to.layout.slots(rank).zip(texel_of_slot) {
-                if let Some(shown) = from.layout.slot(old, texel as usize) {
-                    let irradiance = self.light.indirect.get(shown);
-                    next.light.indirect.set(slot, irradiance);
-                }
-            }
-            let old = &self.schedule.state[from.layout.rank[old.get()].get()];
-            if old.has_indirect {
-                next.schedule.state[rank.get()].has_indirect = true;
-                next.schedule.touch(rank, f32::INFINITY);
+        for block in (0..scene.level.blocks.len()).map(BlockIndex::new) {
+            if let Some(old) = old_block(block) {
+                next.take_indirect(block, self, old);
             }
         }
         *self = next;
+    }
+
+    /// Takes the indirect light of a block from a block of another frame, at the walls that both have.
+    fn take_indirect(&mut self, block: BlockIndex, from: &Frame, old: BlockIndex) {
+        let (level, old_level) = (&self.scene.level, &from.scene.level);
+        let (Some(placed), Some(old_placed)) = (level.block(block), old_level.block(old)) else {
+            return;
+        };
+        let old_state = &from.schedule.state[from.scene.layout.rank[old.get()].get()];
+        if placed.shape.form != old_placed.shape.form
+            || level.resolution != old_level.resolution
+            || !old_state.has_indirect
+        {
+            return;
+        }
+        let mut old_texel = vec![None; placed.texels.len()];
+        for face in Face::ALL {
+            for row in 0..level.resolution {
+                for column in 0..level.resolution {
+                    if let Some(texel) = level.level_texel(block, face, row, column) {
+                        old_texel[texel] = old_level.level_texel(old, face, row, column);
+                    }
+                }
+            }
+        }
+        let layout = &self.scene.layout;
+        let rank = layout.rank[block.get()];
+        let texel_of_slot = &layout.texel_of_slot[layout.shape(rank)];
+        for (slot, &texel) in layout.slots(rank).zip(texel_of_slot) {
+            let texel = old_texel.get(texel as usize).copied().flatten();
+            if let Some(shown) = texel.and_then(|texel| from.scene.layout.slot(old, texel)) {
+                let irradiance = from.light.indirect.get(shown);
+                self.light.indirect.set(slot, irradiance);
+            }
+        }
+        self.schedule.state[rank.get()].has_indirect = true;
+        self.schedule.touch(rank, f32::INFINITY);
     }
 }
 

@@ -2,7 +2,9 @@
 
 mod bake_reproducible;
 mod direct_light;
+mod documents;
 mod doors;
+mod facade;
 mod frame;
 mod lightmap;
 mod old_versions;

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use mrt_core::geometry::cube::Face;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::oracle_file::{Kind, ReferenceError, read};
 use serde_json::{Value, json};
 
@@ -65,12 +65,23 @@ fn a_sound_file_reads_back() {
     assert_eq!(file.kind, Kind::Irradiance);
     assert_eq!(file.walls[1], (0, Face::NegY));
     assert_eq!(file.hops(0).unwrap(), [0, 0, 0, 0, 0, 1, 1, 1, 1, 1]);
-    let first = file.indirect_irradiance(0, Bounces::First, 0.5).unwrap();
+    let first = file
+        .indirect_irradiance(0, ReferenceBounces::First, 0.5)
+        .unwrap();
     assert_eq!(first[3], 0.5 * 0.25 * 43.0);
-    assert!(file.indirect_irradiance(1, Bounces::First, 0.5).is_err());
-    assert!(file.indirect_irradiance(0, Bounces::Count(2), 0.5).is_err());
+    assert!(
+        file.indirect_irradiance(1, ReferenceBounces::First, 0.5)
+            .is_err()
+    );
+    assert!(
+        file.indirect_irradiance(0, ReferenceBounces::Count(2), 0.5)
+            .is_err()
+    );
     // Two terms are too few to estimate the bounces beyond them.
-    assert!(file.indirect_irradiance(0, Bounces::All, 0.5).is_err());
+    assert!(
+        file.indirect_irradiance(0, ReferenceBounces::All, 0.5)
+            .is_err()
+    );
     assert!(file.hops(1).is_err());
 }
 

@@ -4,7 +4,7 @@
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
@@ -19,7 +19,7 @@ const ALBEDO: f64 = 0.6;
 const LIGHT: DVec3 = DVec3::new(0.4, 0.55, 0.1);
 
 /// Indirect irradiance by the exact solver and by the three transports.
-fn solved(bounces: Bounces) -> (Vec<f64>, [Vec<f64>; 3], Warped) {
+fn solved(bounces: ReferenceBounces) -> (Vec<f64>, [Vec<f64>; 3], Warped) {
     let warp = stretched([1.0, 1.0, LENGTH]);
     let hall = warped(&SHAPES[0], &canonical(&SHAPES[0]), &warp);
     let scene = ExactScene::new(vec![warp], vec![[Side::Wall; 6]], RESOLUTION).unwrap();
@@ -40,7 +40,11 @@ fn solved(bounces: Bounces) -> (Vec<f64>, [Vec<f64>; 3], Warped) {
     .unwrap();
     let direct = warped_direct_samples(&hall.walls, &[LIGHT], hall.light_radius);
     // After 30 bounces, less than 1e-6 of the light is left.
-    let count = if bounces == Bounces::First { 1 } else { 30 };
+    let count = if bounces == ReferenceBounces::First {
+        1
+    } else {
+        30
+    };
     let found = hall.transports.each_ref().map(|(t, u)| {
         let mut indirect = vec![0.0; direct.rows()];
         for _ in 0..count {
@@ -77,8 +81,8 @@ fn along_the_axis(hall: &Warped, irradiance: &[f64]) -> [f64; 4] {
 fn each_transport_of_a_long_hall_is_closer_to_the_exact_light_than_the_one_before() {
     println!("| bounces | transport | L2 % | quarters of the hall from the light: found / exact |");
     for (bounces, bounds) in [
-        (Bounces::First, [0.52, 0.18, 0.04]),
-        (Bounces::All, [0.54, 0.15, 0.025]),
+        (ReferenceBounces::First, [0.52, 0.18, 0.04]),
+        (ReferenceBounces::All, [0.54, 0.15, 0.025]),
     ] {
         let (truth, found, hall) = solved(bounces);
         let exact = along_the_axis(&hall, &truth);

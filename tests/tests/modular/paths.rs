@@ -4,9 +4,10 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::reference::radiosity::transport::Transport;
-use mrt_dictionary::modular::paths::transport::{
-    EMITTER, Gather, RECEIVER, Signals, gather, texel_at,
-};
+use mrt_dictionary::modular::paths::ends::{EMITTER, RECEIVER};
+use mrt_dictionary::modular::paths::gather::{Signals, gather};
+use mrt_dictionary::modular::surface::output_grid::OutputGrid;
+use mrt_dictionary::modular::surface::walls::cube::texel_at;
 use mrt_runtime::low_level::level::shape::Hole;
 use mrt_runtime::low_level::modular::path::{Crossing, Word, response_frame};
 use mrt_runtime::{Bounces, Coupling, Dictionary, Frame, FrameConfig};
@@ -134,7 +135,7 @@ fn reversed(word: &Word) -> (Word, CubeSymmetry) {
 /// Transport between each two walls along a path and along the reversed path, per unit of area. The last pair is the sum
 /// over all walls.
 fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
-    let setup = Gather {
+    let setup = OutputGrid {
         resolution,
         probes: 0,
         vector: false,

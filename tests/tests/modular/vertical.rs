@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
-use mrt_core::reference::bounces::Bounces as ExactBounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
 use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Level, Light, Scene};
 use mrt_tests::{
@@ -134,7 +134,7 @@ fn a_stack_is_within_the_bounds_of_the_standard_preset() {
             .map(|e| f64::from(e[0]))
             .collect();
         let theirs = reference
-            .indirect_irradiance(light, ExactBounces::First, 1.0)
+            .indirect_irradiance(light, ReferenceBounces::First, 1.0)
             .expect("the file has the term");
         let hops = reference.hops(light).expect("the light is in the file");
         let by_hop = rel_l2_by_hop(&ours, &theirs, &hops);

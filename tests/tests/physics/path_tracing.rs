@@ -3,7 +3,7 @@
 use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::geometry::mesh::TriangleMesh;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
 use mrt_core::reference::radiosity::ExactScene;
@@ -63,7 +63,7 @@ fn a_cube_agrees_with_the_exact_solver_within_its_noise() {
         let green: Vec<f64> = traced.iter().map(|e| e.indirect.y / 2.0).collect();
         let blue: Vec<f64> = traced.iter().map(|e| e.indirect.z * 2.0).collect();
         assert!(rel_l2(&green, &blue) < 1e-12);
-        let bounces = Bounces::Count(bounces as usize);
+        let bounces = ReferenceBounces::Count(bounces as usize);
         let exact = solve(&scene, &transport, &quarters, bounces, &albedo).unwrap();
         // The radiosity that a path meets deviates from its mean by less than the mean: the spot nearest to the light has
         // 2.6 times the mean. So the error of N independent paths is below 1/sqrt(N), 3.1 %. The exact solver adds 0.5 % at

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_mean, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve;
@@ -171,7 +171,8 @@ fn a_furnace_glows_as_the_geometric_series_says() {
             // Direct light of e / a makes the first reflection emit e.
             let direct = vec![[EMISSION / albedo; 4]; scene.texel_count()];
             let albedos = vec![albedo; scene.texel_count()];
-            let irradiance = solve(&scene, &transport, &direct, Bounces::All, &albedos).unwrap();
+            let irradiance =
+                solve(&scene, &transport, &direct, ReferenceBounces::All, &albedos).unwrap();
             for e in irradiance {
                 let radiosity = EMISSION + albedo * e;
                 let expected = EMISSION / (1.0 - albedo);
@@ -254,7 +255,14 @@ fn light_in_an_unconnected_block_is_exactly_zero() {
     let transport = Transport::build(&scene);
     let quarters = direct_quarters(&scene, &light, 2);
     let albedo = vec![0.9; scene.texel_count()];
-    let indirect = solve(&scene, &transport, &quarters, Bounces::All, &albedo).unwrap();
+    let indirect = solve(
+        &scene,
+        &transport,
+        &quarters,
+        ReferenceBounces::All,
+        &albedo,
+    )
+    .unwrap();
     let straight = direct(&scene, &light);
     for wall in scene.walls() {
         for texel in wall.first_texel..wall.first_texel + 64 {
@@ -289,11 +297,14 @@ fn all_bounces_are_the_limit_of_many() {
     let quarters = direct_quarters(&scene, &light, 4);
     let albedo = vec![0.8; scene.texel_count()];
     let run = |bounces| solve(&scene, &transport, &quarters, bounces, &albedo).unwrap();
-    let all = run(Bounces::All);
+    let all = run(ReferenceBounces::All);
     // 80 bounces leave out a share of 0.8^80 = 2e-8, and the limit is solved to 1e-7 of the first bounce.
-    assert!(rel_l2(&run(Bounces::Count(80)), &all) < 1e-6);
-    assert_eq!(run(Bounces::Count(1)), run(Bounces::First));
-    assert!(run(Bounces::Count(0)).iter().all(|&e| e == 0.0));
+    assert!(rel_l2(&run(ReferenceBounces::Count(80)), &all) < 1e-6);
+    assert_eq!(
+        run(ReferenceBounces::Count(1)),
+        run(ReferenceBounces::First)
+    );
+    assert!(run(ReferenceBounces::Count(0)).iter().all(|&e| e == 0.0));
 }
 
 #[test]
@@ -305,7 +316,14 @@ fn the_number_of_threads_changes_no_bit() {
             let quarters = direct_quarters(&scene, &light, 3);
             let transport = Transport::build(&scene);
             let albedo = vec![0.7; scene.texel_count()];
-            solve(&scene, &transport, &quarters, Bounces::All, &albedo).unwrap()
+            solve(
+                &scene,
+                &transport,
+                &quarters,
+                ReferenceBounces::All,
+                &albedo,
+            )
+            .unwrap()
         })
     };
     assert_eq!(solved_with(1), solved_with(3));
@@ -343,14 +361,21 @@ fn faulty_inputs_are_refused_by_a_named_error() {
     let transport = Transport::build(&scene);
     let light = vec![[1.0; 4]; 24];
     for (albedo, bounces) in [
-        (1.0, Bounces::All),
-        (1.1, Bounces::First),
-        (f64::NAN, Bounces::First),
-        (-0.1, Bounces::All),
+        (1.0, ReferenceBounces::All),
+        (1.1, ReferenceBounces::First),
+        (f64::NAN, ReferenceBounces::First),
+        (-0.1, ReferenceBounces::All),
     ] {
         let error = solve(&scene, &transport, &light, bounces, &[albedo; 24]).unwrap_err();
         assert!(matches!(error, ExactError::Albedo { .. }), "{error}");
     }
-    let error = solve(&scene, &transport, &light, Bounces::All, &[0.5; 23]).unwrap_err();
+    let error = solve(
+        &scene,
+        &transport,
+        &light,
+        ReferenceBounces::All,
+        &[0.5; 23],
+    )
+    .unwrap_err();
     assert!(matches!(error, ExactError::Length { found: 23, .. }));
 }

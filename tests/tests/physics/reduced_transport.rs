@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 use mrt_core::linalg::matrix::{Matrix, multiply, transpose_multiply};
-use mrt_dictionary::modular::light_prior::cube::ScaledBasis;
+use mrt_dictionary::modular::light_prior::basis::ScaledBasis;
 use mrt_dictionary::modular::one_bounce::cube::{
     Reconstruction, closed_cube_bounce, restrict_to_shape,
 };
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::low_level::level::shape::cubes;

@@ -3,19 +3,19 @@
 use glam::Vec3;
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
 use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
 use mrt_dictionary::config::PriorConfig;
-use mrt_dictionary::modular::light_prior::cube::{direct_samples, light_prior};
+use mrt_dictionary::modular::light_prior::basis::light_prior;
+use mrt_dictionary::modular::light_prior::cube::direct_samples;
 use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::blocks::Shape;
 use mrt_runtime::{
-    AssembleConfig, AssembleError, BlockIndex, Bounces as Passes, Coupling, Dictionary, Frame,
-    Level, Light,
+    AssembleConfig, AssembleError, BlockIndex, Bounces, Coupling, Dictionary, Frame, Level, Light,
 };
 use mrt_tests::{CONVERGED, baked, configured, default_dictionary, reference, refusal, solved};
 use std::sync::OnceLock;
@@ -59,7 +59,7 @@ fn solve_all(
     reference: &ReferenceFile,
     dictionary: &Dictionary,
     coupling: Coupling,
-    bounces: Bounces,
+    bounces: ReferenceBounces,
     albedo: f64,
 ) -> Vec<Pair> {
     let level = level(reference, albedo);
@@ -70,9 +70,9 @@ fn solve_all(
     let scene = configured(&level, dictionary, &config);
     let coloured = matches!(reference.kind, Kind::IrradianceRgb { .. });
     let passes = match bounces {
-        Bounces::First => Passes::Count(1),
+        ReferenceBounces::First => Bounces::Count(1),
         // Coloured files have no more bounces.
-        _ if coloured => Passes::Count(RGB_BOUNCES as u32),
+        _ if coloured => Bounces::Count(RGB_BOUNCES as u32),
         _ => CONVERGED,
     };
     (0..reference.lights.len())
@@ -151,7 +151,13 @@ fn first_bounce_errors(dictionary: &Dictionary, coupling: Coupling) -> [f64; 1 +
     let mut groups: [Vec<f64>; 1 + HOP_GROUPS] = Default::default();
     for name in WHITE {
         let reference = reference(name);
-        let pairs = solve_all(&reference, dictionary, coupling, Bounces::First, 1.0);
+        let pairs = solve_all(
+            &reference,
+            dictionary,
+            coupling,
+            ReferenceBounces::First,
+            1.0,
+        );
         for (light, pair) in pairs.iter().enumerate() {
             groups[0].push(pair.error());
             let hops = reference.hops(light).expect("the light is in the file");
@@ -236,7 +242,7 @@ fn all_bounces_error(dictionary: &Dictionary, albedo: f64) -> f64 {
             &reference,
             dictionary,
             Coupling::Table,
-            Bounces::All,
+            ReferenceBounces::All,
             albedo,
         )
         .iter()
@@ -268,7 +274,7 @@ fn all_bounces_in_white_levels_are_within_the_bounds() {
 }
 
 /// Mean error over all lights of a coloured reference.
-fn coloured_error(name: &str, dictionary: &Dictionary, bounces: Bounces) -> f64 {
+fn coloured_error(name: &str, dictionary: &Dictionary, bounces: ReferenceBounces) -> f64 {
     let reference = reference(name);
     let pairs = solve_all(&reference, dictionary, Coupling::Table, bounces, 1.0);
     mean(pairs.iter().map(Pair::error))
@@ -280,7 +286,10 @@ const COLOURED: [&str; 3] = ["cube_one_white", "cube_cornell", "corridor5_painte
 #[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn coloured_walls_are_within_the_bounds() {
     for (name, bounds) in [("standard", [0.06, 0.04]), ("quality", [0.03, 0.02])] {
-        for (bounces, bound) in [Bounces::First, Bounces::All].into_iter().zip(bounds) {
+        for (bounces, bound) in [ReferenceBounces::First, ReferenceBounces::All]
+            .into_iter()
+            .zip(bounds)
+        {
             let errors = COLOURED.map(|file| coloured_error(file, preset(name), bounces));
             let error = mean(errors);
             println!("coloured, {name}, {bounces:?}: {error:.4} of {errors:.4?}");
@@ -301,7 +310,7 @@ fn a_white_wall_among_dark_ones_keeps_its_brightness() {
     let white = (0..albedo.len())
         .max_by(|&a, &b| darkest(a).total_cmp(&darkest(b)))
         .expect("there are walls");
-    for bounces in [Bounces::First, Bounces::All] {
+    for bounces in [ReferenceBounces::First, ReferenceBounces::All] {
         let pairs = solve_all(
             &reference,
             default_dictionary(),
@@ -347,7 +356,7 @@ fn unenriched_error(reference: &ReferenceFile, modes: usize) -> f64 {
         let coefficients = multiply(transport.coefficients_from_direct.view(), direct.view());
         let ours = multiply(transport.indirect_basis.view(), coefficients.view());
         let theirs = reference
-            .indirect_irradiance(light, Bounces::First, 1.0)
+            .indirect_irradiance(light, ReferenceBounces::First, 1.0)
             .expect("the file has the term");
         rel_l2(ours.data(), &theirs)
     }))

@@ -6,7 +6,7 @@
 //! compared as means over 4 x 4 texels. These have a quarter of the noise, and any error of the solver in full.
 
 use glam::DVec3;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
 use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
 use mrt_core::reference::radiosity::ExactScene;
@@ -105,10 +105,10 @@ fn check_colourless(name: &str) {
     let level = load(name);
     let (file, scene, transport) = (&level.file, &level.scene, &level.transport);
     let terms = [
-        ("first bounce", Bounces::First, 1.0),
-        ("6 bounces, albedo 0.9", Bounces::Count(6), 0.9),
-        ("all, albedo 0.5", Bounces::All, 0.5),
-        ("all, albedo 0.9", Bounces::All, 0.9),
+        ("first bounce", ReferenceBounces::First, 1.0),
+        ("6 bounces, albedo 0.9", ReferenceBounces::Count(6), 0.9),
+        ("all, albedo 0.5", ReferenceBounces::All, 0.5),
+        ("all, albedo 0.9", ReferenceBounces::All, 0.9),
     ];
     let mut found = terms.map(|_| Vec::new());
     for (light, &position) in file.lights.iter().enumerate() {
@@ -163,8 +163,8 @@ fn check_coloured(name: &str) {
     };
     let albedo = scene.spread_over_texels(albedo).unwrap();
     let terms = [
-        ("first bounce", Bounces::First),
-        ("10 bounces", Bounces::Count(RGB_BOUNCES)),
+        ("first bounce", ReferenceBounces::First),
+        ("10 bounces", ReferenceBounces::Count(RGB_BOUNCES)),
     ];
     let mut found = terms.map(|_| Vec::new());
     for (light, &position) in file.lights.iter().enumerate() {
@@ -218,7 +218,13 @@ fn probe_files_hold_coefficients_and_no_irradiance() {
         let file = reference(name);
         assert_eq!(file.shape[2..], [points, 9]);
         assert_eq!(file.term(1, 0).unwrap().len(), points * 9);
-        assert!(file.indirect_irradiance(0, Bounces::First, 1.0).is_err());
-        assert!(file.indirect_irradiance_rgb(0, Bounces::First).is_err());
+        assert!(
+            file.indirect_irradiance(0, ReferenceBounces::First, 1.0)
+                .is_err()
+        );
+        assert!(
+            file.indirect_irradiance_rgb(0, ReferenceBounces::First)
+                .is_err()
+        );
     }
 }

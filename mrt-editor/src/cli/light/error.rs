@@ -2,7 +2,7 @@
 
 use crate::cli::dictionary_source::SourceError;
 use crate::document::level_file::LevelFileError;
-use crate::import::ImportError;
+use crate::import::error::ImportError;
 use crate::render::file::WriteError;
 use glam::Vec3;
 use mrt_runtime::{AssembleError, SkippedLight};

@@ -1,14 +1,13 @@
 //! The files that `mrt light` leaves: all of them, or none.
 
 use super::View;
-use crate::receiver::unwrap::LitTriangle;
 use crate::render::Picture;
-use crate::render::file::{WriteError, write_hdr, write_png};
+use crate::render::file::{Saves, WriteError, write_hdr, write_png};
 use crate::render::lit::LitScene;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::Vec3;
 use mrt_core::container::write_file_atomically;
-use mrt_runtime::BlockIndex;
+use mrt_runtime::low_level::output::receiver::UnwrappedTriangle;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,7 +17,7 @@ pub(super) fn write(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[LitTriangle],
+    unwrapped: &[UnwrappedTriangle],
 ) -> Result<(), WriteError> {
     let mut name = folder.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.part", std::process::id()));
@@ -47,7 +46,7 @@ fn write_files(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[LitTriangle],
+    unwrapped: &[UnwrappedTriangle],
 ) -> Result<Vec<PathBuf>, WriteError> {
     let mut files = Vec::new();
     let mut name = |file: String| {
@@ -58,7 +57,7 @@ fn write_files(
         for (picture, suffix) in view.pictures.iter().zip(["-direct", "-indirect", ""]) {
             let path = name(format!("{}{suffix}.png", view.name));
             let pixels = tone_map(picture, view.exposure);
-            write_png(&path, [picture.width, picture.height], &pixels)?;
+            write_png(&path, [picture.width, picture.height], &pixels, Saves::Time)?;
         }
     }
     let lightmap = Picture {
@@ -68,7 +67,7 @@ fn write_files(
     };
     let size = [lightmap.width, lightmap.height];
     let pixels = tone_map(&lightmap, auto_exposure(&[&lightmap]));
-    write_png(&name("lightmap.png".to_owned()), size, &pixels)?;
+    write_png(&name("lightmap.png".to_owned()), size, &pixels, Saves::Time)?;
     write_hdr(&name("lightmap.hdr".to_owned()), &lightmap)?;
     let obj = obj_text(lit, unwrapped);
     write_file_atomically(&name("mesh.obj".to_owned()), obj.as_bytes())?;
@@ -78,7 +77,7 @@ fn write_files(
 }
 
 /// The mesh with coordinates into the lightmap; v runs upwards, as is usual in OBJ.
-fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
+fn obj_text(lit: &LitScene<'_>, unwrapped: &[UnwrappedTriangle]) -> String {
     let mut text = String::from("mtllib mesh.mtl\n");
     let mut positions = HashMap::new();
     let mut coordinates = HashMap::new();
@@ -109,7 +108,7 @@ fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
             let (u, v) = (receiver.u as f32, receiver.v as f32);
             let uv = lit
                 .atlas
-                .texture_coordinate(BlockIndex::new(receiver.block), receiver.face, u, v)
+                .texture_coordinate(receiver.block, receiver.face, u, v)
                 .unwrap_or_default();
             let next = coordinates.len() + 1;
             let coordinate = *coordinates

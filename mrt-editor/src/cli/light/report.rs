@@ -1,7 +1,7 @@
 //! What `mrt light` prints.
 
 use super::View;
-use crate::import::ImportReport;
+use crate::import::report::ImportReport;
 use crate::render::Picture;
 use crate::render::lit::SphereLight;
 use crate::render::tone::luminance;

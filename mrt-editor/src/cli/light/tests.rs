@@ -42,6 +42,11 @@ fn mapped_room() -> tempfile::TempDir {
     folder
 }
 
+/// Luminance of each pixel of a picture, encoded as sRGB.
+fn luminances(path: &Path) -> Vec<u8> {
+    image::open(path).expect("a picture").to_luma8().into_raw()
+}
+
 #[test]
 fn a_room_is_mapped_and_lit() {
     let folder = mapped_room();
@@ -58,12 +63,8 @@ fn a_room_is_mapped_and_lit() {
     }
     // Nothing but the scene, the level and the pictures.
     assert_eq!(fs::read_dir(folder.path()).expect("reads").count(), 3);
-    let picture = image::open(out.join("view1-indirect.png")).expect("a picture");
-    let lit = picture
-        .to_luma8()
-        .pixels()
-        .filter(|pixel| pixel.0[0] > 10)
-        .count();
+    let picture = luminances(&out.join("view1-indirect.png"));
+    let lit = picture.iter().filter(|&&value| value > 10).count();
     assert!(lit > 32 * 18 / 2, "{lit} lit pixels");
 }
 
@@ -76,12 +77,8 @@ fn shadow_rays_and_openings_agree_in_an_empty_room() {
             &format!("--size 16x9 --shadows {shadows} --exposure 0"),
         )
         .expect("lights");
-        let picture = image::open(folder.path().join("out/view1-indirect.png"));
-        let picture = picture.expect("a picture").to_luma8();
-        picture
-            .pixels()
-            .map(|pixel| u64::from(pixel.0[0]))
-            .sum::<u64>()
+        let picture = luminances(&folder.path().join("out/view1-indirect.png"));
+        picture.into_iter().map(u64::from).sum::<u64>()
     };
     assert_eq!(mean("openings"), mean("rays"));
 }

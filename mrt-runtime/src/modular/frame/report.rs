@@ -54,11 +54,8 @@ impl FrameReport {
     /// Tiles of the lightmap that were written, ascending; all others are as they were. None without a lightmap.
     pub fn changed_tiles(&self) -> impl ExactSizeIterator<Item = Tile> + '_ {
         let (columns, size) = (self.0.columns.max(1), self.0.tile_size);
-        self.0.tiles.iter().map(move |&tile| Tile {
-            x: tile as usize % columns * size,
-            y: tile as usize / columns * size,
-            size,
-        })
+        let tiles = self.0.tiles.iter();
+        tiles.map(move |&tile| Tile::of_grid(tile as usize, columns, size))
     }
 
     /// Blocks that the frame worked on.

@@ -6,7 +6,7 @@ use crate::modular::packed::shape::PackedShape;
 use glam::Vec3;
 use mrt_core::simd::folded::{Albedo, Reflected, fold};
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows, dot_unlike_rows};
-use mrt_core::simd::tiles::{CHANNELS, Element};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber};
 use mrt_core::simd::{Kernel, Lanes};
 
 /// `b = T_d->b (albedo (direct + indirect) + emission)` of one block.
@@ -88,7 +88,7 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
 }
 
 #[inline(always)]
-fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
+fn coefficients<L: Lanes, E: PackedNumber>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
     let stride = block.shape.folding.stride;
     let place = block.coefficients.len() / CHANNELS;
     let albedo = block.later().unwrap_or([1.0; CHANNELS]);

@@ -3,7 +3,7 @@
 use crate::modular::kernels::scratch::{Scratch, scale_joint};
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::Tiled;
-use mrt_core::simd::tiles::{CHANNELS, Element, Rgb, TILE, Term, sum_tile};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber, Rgb, TILE, Term, sum_tile};
 use mrt_core::simd::{Kernel, Lanes, WIDEST};
 
 /// A tiled basis times joint coefficients: row after row, channel by channel.
@@ -32,7 +32,7 @@ impl Kernel for Expand<'_> {
 }
 
 #[inline(always)]
-fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
+fn expand_rows<L: Lanes, E: PackedNumber>(l: L, values: &[E], job: &mut Expand<'_>) {
     let basis = job.basis;
     let columns = basis.columns.get(0..basis.columns.len());
     let count = columns.indices().len();

@@ -4,7 +4,7 @@ use crate::modular::kernels::scratch::{Flux, Scratch, scale_joint};
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::PackedShape;
 use mrt_core::simd::folded::{Basis, unfold};
-use mrt_core::simd::tiles::{CHANNELS, Element, Rgb};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber, Rgb};
 use mrt_core::simd::{Kernel, Lanes};
 
 /// Irradiance of one block from its joint coefficients.
@@ -51,7 +51,7 @@ impl Kernel for IndirectOf<'_> {
 }
 
 #[inline(always)]
-fn expand<L: Lanes, E: Element, const GROUP: usize>(
+fn expand<L: Lanes, E: PackedNumber, const GROUP: usize>(
     l: L,
     joint: &[E],
     block: &mut IndirectOf<'_>,

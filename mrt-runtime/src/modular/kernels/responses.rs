@@ -5,7 +5,7 @@ use crate::modular::packed::shape::PackedShape;
 use crate::modular::packed::transport::{PackedTransport, TransportEntry};
 use crate::output::texel_layout::BlockRank;
 use mrt_core::simd::tiles::{
-    CHANNELS, Element, Finish, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
+    CHANNELS, Finish, HALF_TILE, PackedNumber, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
 };
 use mrt_core::simd::{Kernel, Lanes};
 use std::ops::Range;
@@ -78,7 +78,7 @@ impl Kernel for ResponsesOf<'_> {
 }
 
 #[inline(always)]
-fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
+fn arrive<L: Lanes, E: PackedNumber>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
     let transport = block.transport;
     let stride = block.joint.len() / CHANNELS;
     let own = CHANNELS * stride * block.block.get();
@@ -210,7 +210,7 @@ fn run_of(entries: &[TransportEntry]) -> Option<(Range<usize>, usize)> {
 }
 
 #[inline(always)]
-fn sum_terms<'a, L: Lanes, E: Element>(
+fn sum_terms<'a, L: Lanes, E: PackedNumber>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Finish<'_>,

@@ -7,7 +7,8 @@ use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
-use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
+use mrt_dictionary::modular::one_bounce::warped::warped_bounce;
+use mrt_dictionary::modular::surface::walls::warped::WarpedWalls;
 use mrt_tests::patch_mesh;
 use mrt_tests::warped::*;
 

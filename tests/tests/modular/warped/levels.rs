@@ -5,7 +5,7 @@ use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::lighting::sh::{rotate, rotation_matrices};
 use mrt_core::linalg::matrix::Matrix;
-use mrt_core::reference::bounces::Bounces as ExactBounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::radiosity::ExactScene;
 use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
 use mrt_core::reference::radiosity::quarters::mean_of_quarters;
@@ -150,7 +150,7 @@ impl Exact {
         };
         let quarters = direct_quarters(&self.scene, &light, 4);
         let albedo = vec![f64::from(ALBEDO); self.scene.texel_count()];
-        let bounces = ExactBounces::Count(BOUNCES);
+        let bounces = ReferenceBounces::Count(BOUNCES);
         let indirect = solve(&self.scene, &self.transport, &quarters, bounces, &albedo);
         ExactLight {
             direct: quarters.iter().map(mean_of_quarters).collect(),

@@ -3,15 +3,15 @@
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// Steps of Newton's method before a point counts as out of reach.
+/// Steps of Newton's method after which a point counts as out of reach.
 const MOST_STEPS: usize = 16;
 
 /// `c0 + cx x + cy y + cz z + cxy xy + cxz xz + cyz yz + cxyz xyz`.
 #[derive(Clone, Copy, Debug)]
-pub struct Trilinear {
+pub(super) struct Trilinear {
     constant: DVec3,
     linear: [DVec3; 3],
-    /// yz, xz, xy: by the axis that is missing.
+    /// Of yz, xz and xy: by the axis that is missing.
     mixed: [DVec3; 3],
     cubic: DVec3,
     /// Square of the distance at which a lookup is near enough.
@@ -19,10 +19,10 @@ pub struct Trilinear {
 }
 
 impl Trilinear {
-    /// The same map.
+    /// The hexahedron's map.
     pub fn new(warp: &Hexahedron) -> Self {
         let c = &warp.corners;
-        // A ten-thousandth of a texel.
+        // About a ten-thousandth of a texel.
         let tolerance = 1e-6 * warp.diagonal();
         Self {
             constant: c[0],
@@ -60,8 +60,7 @@ impl Trilinear {
         )
     }
 
-    /// The point of the unit cube that maps to `world`; `None` where Newton's method, from the guess,
-    /// finds none.
+    /// The point of the unit cube that maps to `world`; `None` where Newton's method finds none from the guess.
     pub fn inverse(&self, guess: DVec3, world: DVec3) -> Option<DVec3> {
         let mut unit = guess;
         for _ in 0..MOST_STEPS {
@@ -77,8 +76,8 @@ impl Trilinear {
         None
     }
 
-    /// Gradients of x, y and z in the world: normals of the surfaces on which each is constant, towards
-    /// larger values. `None` where the map is singular.
+    /// Gradients of x, y and z in the world: normals of the surfaces on which each is constant, towards larger values.
+    /// `None` where the map is singular.
     pub fn gradients(&self, unit: DVec3) -> Option<[DVec3; 3]> {
         let jacobian = self.jacobian(unit);
         let [x, y, z] = [jacobian.x_axis, jacobian.y_axis, jacobian.z_axis];
@@ -91,9 +90,10 @@ impl Trilinear {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use mrt_core::geometry::cube::Face;
 
     #[test]
-    fn is_the_same_map_as_the_hexahedron() {
+    fn points_and_their_inverses_are_those_of_the_hexahedron() {
         let mut warp = Hexahedron::cuboid(DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 4.0, 9.0));
         for (k, corner) in warp.corners.iter_mut().enumerate() {
             *corner += 0.2
@@ -112,13 +112,8 @@ mod tests {
             let back = map.inverse(DVec3::splat(0.5), world).expect("converges");
             assert!(back.distance(unit) < 1e-5);
             let [x, ..] = map.gradients(unit).expect("regular");
-            assert!(
-                x.normalize().dot(warp.face_normal(
-                    mrt_core::geometry::cube::Face::NegX,
-                    unit.z,
-                    unit.y
-                )) > 0.9
-            );
+            let normal = warp.face_normal(Face::NegX, unit.z, unit.y);
+            assert!(x.normalize().dot(normal) > 0.9);
         }
     }
 }

@@ -1,21 +1,19 @@
-//! A cube camera in a block's centre (Loos et al. 2011, section 7.2): what part of the mesh each face of
-//! the block sees.
+//! A cube camera in a block's centre (Loos et al. 2011, section 7.2): which part of the mesh each face of the block sees.
 
-use glam::DVec3;
-use mrt_core::geometry::bvh::Bvh;
+use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Pixels along an edge of each face's picture.
 const RESOLUTION: usize = 64;
 
-/// A point is the one seen in a pixel if it is at most this much further away: pixels have a size, and
+/// A point counts as the one seen in a pixel if it is at most this many times as far away: pixels have a size, and
 /// surfaces are slanted.
 const SLACK: f64 = 1.08;
 
 /// Distances to the mesh through every pixel of the six faces, seen from the centre.
 #[derive(Clone, Debug)]
-pub struct CubeCamera {
+pub(super) struct CubeCamera {
     warp: Hexahedron,
     center: DVec3,
     /// In lengths from the centre to the block's own face; infinite where nothing is seen.
@@ -23,17 +21,16 @@ pub struct CubeCamera {
 }
 
 impl CubeCamera {
-    /// Casts a ray through every pixel.
-    pub fn new(warp: &Hexahedron, bvh: &Bvh) -> Self {
+    /// Casts a ray through every pixel. `first_hit` gives the distance from an origin along a direction to the mesh, in
+    /// lengths of the direction; infinite where the ray meets nothing.
+    pub fn new(warp: &Hexahedron, first_hit: impl Fn(Vec3, Vec3) -> f32) -> Self {
         let center = warp.point(DVec3::splat(0.5));
         let mut depth = Vec::with_capacity(6 * RESOLUTION * RESOLUTION);
         for face in Face::ALL {
             for j in 0..RESOLUTION {
                 for i in 0..RESOLUTION {
                     let target = warp.point(face.texel_center(RESOLUTION, j, i));
-                    let direction = (target - center).as_vec3();
-                    let hit = bvh.closest_hit(center.as_vec3(), direction, f32::INFINITY);
-                    depth.push(hit.map_or(f32::INFINITY, |hit| hit.t));
+                    depth.push(first_hit(center.as_vec3(), (target - center).as_vec3()));
                 }
             }
         }
@@ -44,7 +41,8 @@ impl CubeCamera {
         }
     }
 
-    /// The face through which the point of the unit cube is seen; `None` when something hides it.
+    /// The face through which the camera sees a point, whose place in the unit cube is `unit`; `None` if something hides
+    /// it.
     pub fn face_that_sees(&self, point: DVec3, unit: DVec3) -> Option<Face> {
         let from_center = unit - 0.5;
         let size = from_center.abs();

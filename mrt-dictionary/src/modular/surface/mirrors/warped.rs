@@ -1,12 +1,10 @@
 //! The symmetries that a warped block still has, acting on its texels.
 //!
 //! A symmetry of the cube (a signed exchange of axes) is one of the warped block if it keeps all
-//! distances between the warped corners. Those that are their own inverse and commute split signals into
-//! parity classes, as [`crate::modular::surface::mirrors`] does for canonical shapes: a box keeps the mirrors of all three
-//! axes, a parallelepiped the inversion through its centre, a twisted tower half turns, and a general
-//! hexahedron nothing.
+//! distances between the warped corners. A box keeps the mirrors of all three axes, a parallelepiped the inversion
+//! through its centre, a twisted tower half turns, and a general hexahedron nothing.
 
-use crate::modular::one_bounce::warped::WarpedWalls;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
@@ -14,8 +12,8 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::geometry::texel_permutation::texel_permutation;
 use mrt_core::linalg::parity::ParityClasses;
 
-/// Fraction of a block's diagonal by which distances may differ and still be called equal: rounding of
-/// level files in decimal text, and far below what light would show.
+/// Fraction of a block's diagonal by which distances may differ and still count as equal. Level files in decimal text
+/// round by less, and light shows no difference before far more.
 const EQUAL_DISTANCE: f64 = 1e-9;
 
 /// All 48 symmetries of the cube in the order in which they are tried: those that exchange no axes come first, and of
@@ -57,8 +55,8 @@ fn keeps(symmetry: CubeSymmetry, walls: &WarpedWalls) -> bool {
         && (0..8).all(|a| (0..a).all(|b| keeps_distance(a, b)))
 }
 
-/// Parity classes of the texels under a largest set of commuting symmetries of the warped walls that are
-/// their own inverses; a single class where there is none.
+/// Parity classes of the texels under a largest set of symmetries of the warped walls that commute and are their own
+/// inverses; a single class where there is none.
 pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
     let mut generated = vec![CubeSymmetry::IDENTITY];
     let mut generators = Vec::new();
@@ -85,7 +83,7 @@ pub fn warped_parity_classes(walls: &WarpedWalls) -> ParityClasses {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::surface::mirrors::texel_parity_classes;
+    use crate::modular::surface::mirrors::cube::texel_parity_classes;
     use mrt_runtime::low_level::level::shape::{Outline, Shape, cubes};
 
     fn class_count(corner: impl Fn(DVec3) -> DVec3) -> usize {
@@ -97,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn warps_keep_the_symmetries_that_one_expects() {
+    fn boxes_shears_frustums_and_twists_keep_their_symmetries() {
         assert_eq!(class_count(|p| p * DVec3::new(1.0, 2.0, 3.0)), 8);
         // A shear keeps the inversion, and here the mirror across the plane that it acts in.
         assert_eq!(class_count(|p| p + DVec3::X * (0.5 * p.y)), 4);
@@ -125,8 +123,8 @@ mod tests {
     }
 
     #[test]
-    fn unwarped_shapes_have_the_classes_of_the_dictionary() {
-        // Walls do not know of holes, which is why shapes with one are not rebuilt.
+    fn unwarped_walls_have_the_classes_of_their_shape() {
+        // Warped walls know no holes, which is why shapes with a hole are not rebuilt.
         let has_hole = |shape: &&Shape| shape.openings.iter().any(|o| o.outline != Outline::Whole);
         for shape in cubes().filter(|shape| !has_hole(shape) && shape.wall_count() > 0) {
             let faces: Vec<Face> = shape.walls().collect();

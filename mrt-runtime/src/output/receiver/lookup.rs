@@ -1,5 +1,4 @@
-//! A coarse grid over the level; each cell lists the blocks that matter to points in it,
-//! nearest first.
+//! A coarse grid over the level; each cell lists the blocks that matter to points in it, nearest first.
 
 use glam::DVec3;
 
@@ -8,19 +7,19 @@ const CELLS: usize = 24;
 
 /// Boxes by place.
 #[derive(Clone, Debug)]
-pub struct Lookup {
+pub(super) struct Lookup {
     min: DVec3,
     edge: DVec3,
     candidates: Vec<Vec<u32>>,
 }
 
 impl Lookup {
-    /// Sorts boxes, given by their smallest and largest corners, into the grid; a cell gets every box that
-    /// can be nearest to a point in it, or at most `margin` further than the nearest.
+    /// Sorts boxes, given by their smallest and largest corners, into the grid. A cell gets every box that can be nearest
+    /// to a point in it, or at most `margin` metres further than the nearest.
     pub fn new(boxes: &[(DVec3, DVec3)], margin: f64) -> Self {
         let min = boxes.iter().map(|b| b.0).fold(DVec3::MAX, DVec3::min);
         let max = boxes.iter().map(|b| b.1).fold(DVec3::MIN, DVec3::max);
-        // Meshes reach beyond the blocks; further out, the outermost cells serve.
+        // Meshes reach beyond the blocks. Points beyond the grid use its outermost cells.
         let around = (max - min) * 0.1;
         let (min, max) = (min - around, max + around);
         let edge = (max - min) / CELLS as f64;
@@ -56,7 +55,7 @@ impl Lookup {
         }
     }
 
-    /// Boxes to ask about a point.
+    /// Boxes that can be nearest to a point, or nearly so.
     pub fn candidates(&self, point: DVec3) -> &[u32] {
         let cell = ((point - self.min) / self.edge)
             .clamp(DVec3::ZERO, DVec3::splat(CELLS as f64 - 1.0))
@@ -68,6 +67,6 @@ impl Lookup {
 }
 
 /// Distance from a point to a box, zero inside.
-pub fn box_distance(point: DVec3, (min, max): (DVec3, DVec3)) -> f64 {
+pub(super) fn box_distance(point: DVec3, (min, max): (DVec3, DVec3)) -> f64 {
     point.distance(point.clamp(min, max))
 }

@@ -1,0 +1,14 @@
+//! What a scene may measure.
+
+/// Larger files are refused before they are read.
+pub const MAX_FILE_BYTES: u64 = 1 << 30;
+
+/// Only this much of a material library is read.
+pub const MAX_LIBRARY_BYTES: u64 = 16 << 20;
+
+/// Larger coordinates, in metres, are refused: squared distances have to stay finite.
+pub const MAX_COORDINATE_M: f32 = 1e9;
+
+/// Albedos of files are moved into this range: a wall of albedo 0 never shows a bounce, and between walls of albedo 1
+/// light never dies out.
+pub const ALBEDO_RANGE: [f32; 2] = [0.05, 0.9];

@@ -1,0 +1,89 @@
+//! A torch walks through the maze, and a game uploads what it changes: a few tiles of the lightmap, no more.
+//!
+//! `cargo run --release -p mrt-runtime --example moving_light [FOLDER]`
+
+mod common;
+
+use common::picture::Picture;
+use common::view::{self, Camera, Shown};
+use mrt_runtime::glam::vec3;
+use mrt_runtime::{AssembleConfig, Dictionary, Frame, FrameConfig, Level, Light, Scene};
+use std::error::Error;
+use std::path::Path;
+
+/// Where the torch is, x and z in metres. The fourth place is inside a wall: players clip, animations overshoot.
+const WALK: [[f32; 2]; 6] = [
+    [0.6, 0.5],
+    [1.5, 0.5],
+    [2.4, 0.5],
+    [3.4, 0.5],
+    [2.5, 1.5],
+    [2.5, 2.5],
+];
+
+/// Frames between two of these places.
+const FRAMES: usize = 8;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    run(&common::folder())
+}
+
+/// Writes one picture of the six places.
+pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
+    let dictionary = Dictionary::from_bytes(include_bytes!("../../assets/cubes-2d-standard.mrt"))?;
+    let level = Level::from_text(include_str!("../../assets/maze.level.toml"))?;
+    let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
+    let config = FrameConfig {
+        // Light that changes by less than this, W/m², stays as it is: a thousandth of the brightest shows nowhere. Far from
+        // the torch nothing is computed or uploaded then, and nothing anywhere once it rests.
+        tolerance: 0.02,
+        ..FrameConfig::default()
+    };
+    let mut frame = Frame::new(&scene, config);
+    // A lamp that stays, and a torch. Ids stay valid whatever is added or removed later.
+    frame.add_light(Light::sphere(vec3(4.5, 0.6, 3.5), 0.1, vec3(0.6, 0.9, 1.6)));
+    let torch = frame.add_light(torch_at(WALK[0]));
+    let lightmap = frame.lightmap();
+    let whole = lightmap.width() * lightmap.height() * size_of::<[u16; 4]>();
+    // Memory that each upload uses again.
+    let mut staging = Vec::new();
+    let mut pictures = Vec::new();
+    for place in WALK {
+        frame.set_light(torch, torch_at(place));
+        let (mut tiles, mut bytes) = (0, 0);
+        for _ in 0..FRAMES {
+            let report = frame.solve();
+            for tile in report.changed_tiles() {
+                // Pixels as textures of the format RGBA16F take them. A game now copies them to the square of `tile.size`
+                // pixels at (`tile.x`, `tile.y`) of its texture.
+                frame.lightmap().write_rgba16f(tile, &mut staging);
+                tiles += 1;
+                bytes += size_of_val(&staging[..]);
+            }
+        }
+        println!(
+            "torch at {place:?}: {tiles} tiles, {} KiB in {FRAMES} frames; whole lightmaps would be {} KiB",
+            bytes / 1024,
+            FRAMES * whole / 1024
+        );
+        // A light that cannot shine does not stop the others. Its id says which one it was.
+        for skipped in frame.last_report().skipped_lights() {
+            assert_eq!(skipped.id, torch);
+            println!("  skipped {skipped}");
+        }
+        let marker = view::torch(vec3(place[0], 0.6, place[1]));
+        let camera = Camera::above([5.0, 4.0], [420, 300]);
+        let shown = Shown::DirectAndIndirect;
+        pictures.push(view::draw(&level, &frame, camera, shown, marker));
+    }
+    let mut frames = 1;
+    while frame.solve().changed_tiles().len() > 0 {
+        frames += 1;
+    }
+    println!("the torch rests: nothing is left to upload after {frames} frames");
+    Picture::sheet(&pictures, 3).write(out, "moving_light.png", 1.5)
+}
+
+fn torch_at([x, z]: [f32; 2]) -> Light {
+    Light::sphere(vec3(x, 0.6, z), 0.1, vec3(3.0, 2.0, 1.2))
+}
