@@ -1,4 +1,4 @@
-//! Names and paths in the documents exist.
+//! Names and paths that the documents cite exist.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 const ROOT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
 
-/// Files of the checkout below a folder, build outputs aside.
+/// Collects all files below a folder but build outputs and hidden ones.
 fn files(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(folder).expect("a folder").flatten() {
         let path = entry.path();
@@ -22,7 +22,7 @@ fn files(folder: &Path, out: &mut Vec<PathBuf>) {
     }
 }
 
-/// Everything in the documents that stands between single backquotes, outside blocks of code.
+/// All text between single backquotes, outside blocks of code.
 fn quoted(text: &str) -> Vec<String> {
     let mut quoted = Vec::new();
     let mut in_block = false;
@@ -39,7 +39,7 @@ fn quoted(text: &str) -> Vec<String> {
     quoted
 }
 
-/// True for `Type`, `Type::method`, `snake_case` and `snake::case`: what a reader would search the code for.
+/// True for names that a reader would search the code for: `Type`, `Type::method`, `snake_case` and `snake::case`.
 fn is_name(text: &str) -> bool {
     let is_word = |word: &str| {
         word.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -52,17 +52,28 @@ fn is_name(text: &str) -> bool {
     words.iter().all(|word| is_word(word)) && (is_long || is_type)
 }
 
-#[test]
-fn what_documents_cite_exists() {
-    let root = Path::new(ROOT);
-    let mut all = Vec::new();
-    files(root, &mut all);
-    let is_kind = |path: &Path, kinds: &[&str]| {
-        let kind = path.extension().and_then(|kind| kind.to_str());
-        kind.is_some_and(|kind| kinds.contains(&kind))
-    };
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let extension = path.extension().and_then(|extension| extension.to_str());
+    extension.is_some_and(|extension| extensions.contains(&extension))
+}
+
+/// True for a path below a folder of the checkout.
+fn is_path(text: &str) -> bool {
+    let starts = ["mrt-", "tests/", "docs/", "assets/", "benches/", ".ci/"];
+    text.contains('/')
+        && starts.iter().any(|start| text.starts_with(start))
+        && text
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c))
+}
+
+/// All words of code and manifests outside comments, and all names of such files.
+fn words_of_code(all: &[PathBuf]) -> BTreeSet<String> {
     let mut words = BTreeSet::new();
-    for path in all.iter().filter(|path| is_kind(path, &["rs", "toml"])) {
+    for path in all
+        .iter()
+        .filter(|path| has_extension(path, &["rs", "toml"]))
+    {
         let text = fs::read_to_string(path).expect("text");
         let code = text
             .lines()
@@ -71,25 +82,25 @@ fn what_documents_cite_exists() {
             let found = line.split(|c: char| !c.is_alphanumeric() && c != '_');
             words.extend(found.map(str::to_owned));
         }
-        words.extend(
-            path.file_stem()
-                .map(|stem| stem.to_string_lossy().into_owned()),
-        );
+        let stem = path.file_stem();
+        words.extend(stem.map(|stem| stem.to_string_lossy().into_owned()));
     }
+    words
+}
+
+#[test]
+fn what_documents_cite_exists() {
+    let root = Path::new(ROOT);
+    let mut all = Vec::new();
+    files(root, &mut all);
+    let words = words_of_code(&all);
     let mut faults = Vec::new();
-    let documents = all.iter().filter(|path| is_kind(path, &["md"]));
+    let documents = all.iter().filter(|path| has_extension(path, &["md"]));
     for document in documents.filter(|path| !path.ends_with("CHANGELOG.md")) {
         let folder = document.parent().expect("a file in a folder");
         for text in quoted(&fs::read_to_string(document).expect("text")) {
-            let is_path = text.contains('/')
-                && text
-                    .chars()
-                    .all(|c| c.is_ascii_alphanumeric() || "._-/".contains(c))
-                && ["mrt-", "tests/", "docs/", "assets/", "benches/", ".ci/"]
-                    .iter()
-                    .any(|start| text.starts_with(start));
-            if is_path {
-                // A path is given from the root, or from beside the document.
+            if is_path(&text) {
+                // A path is given from the root, or from the document's folder.
                 if !root.join(&text).exists() && !folder.join(&text).exists() {
                     faults.push(format!("{}: {text}", document.display()));
                 }

@@ -1,4 +1,4 @@
-//! What callers may rely on: outputs, doors, files, bits.
+//! What callers may rely on: the facade, outputs, doors, files, documents, and bits that never change.
 
 mod bake_reproducible;
 mod direct_light;

@@ -1,8 +1,8 @@
-//! Dictionary bytes from anywhere: every fault has a name, and nothing panics.
+//! Dictionaries from arbitrary bytes: every fault is a named error, and nothing panics.
 
-use mrt_core::container::{ByteBudget, ContainerError, Format, Writer};
+use mrt_core::container::{ByteBudget, ContainerError, Writer};
 use mrt_core::linalg::matrix::Matrix;
-use mrt_runtime::blocks::SHAPES;
+use mrt_runtime::blocks::{SHAPES, Shape};
 use mrt_runtime::low_level::level::shape::Hole;
 use mrt_runtime::low_level::modular::dictionary::{
     LightfieldOperators, OpeningOperators, PathEntry, PathTable, ShapeOperators, Sources,
@@ -12,47 +12,29 @@ use mrt_runtime::low_level::modular::dictionary_file::{
     DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, MAX_MODES, MAX_PROBES, MAX_RESOLUTION, MAX_VARIANTS,
 };
 use mrt_runtime::low_level::modular::path::{MAX_WORD, Word};
-use mrt_runtime::{AssembleConfig, AssembleError, Dictionary, DictionaryError, Scene};
-use mrt_tests::{DEFAULT_BYTES, Random, default_dictionary, floor_plan};
+use mrt_runtime::{AssembleError, Dictionary, DictionaryError};
+use mrt_tests::{
+    DEFAULT_BYTES, Random, corridor, default_dictionary, dictionary_format, floor_plan, refusal,
+};
 
 fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
     Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
 }
 
-/// A dictionary of two shapes with 2² texels, one probe and two modes of everything; foreign light adds a third.
+/// A matrix of made-up numbers.
+fn filled(rows: usize, columns: usize) -> Matrix<f32> {
+    Matrix::from_fn(rows, columns, |i, j| (1 + i + 3 * j) as f32 * 0.01)
+}
+
+/// A dictionary of two shapes with 2² texels a wall, one probe and two modes of everything. Light of other blocks adds a
+/// third joint mode.
 fn small() -> Dictionary {
-    let filled =
-        |rows, columns| Matrix::from_fn(rows, columns, |i, j| (1 + i + 3 * j) as f32 * 0.01);
-    let shapes = SHAPES[..2]
-        .iter()
-        .map(|shape| {
-            let texels = shape.texel_count(2);
-            ShapeOperators {
-                shape,
-                coefficients_from_direct: filled(2, texels),
-                joint_basis: filled(texels, 3),
-                probe_basis: filled(9, 3),
-                vector_basis: Matrix::zeros(0, 3),
-                openings: vec![
-                    OpeningOperators {
-                        emission_from_coefficients: vec![filled(2, 2)],
-                        joint_from_response: vec![filled(3, 2)],
-                    };
-                    shape.openings.len()
-                ],
-                implicit_lighting: filled(texels, 2),
-                singular_values: vec![1.0, 0.5],
-                dropped_energy: 0.1,
-                joint_dropped_energy: 0.05,
-            }
-        })
-        .collect();
     Dictionary {
         preset: "small".to_owned(),
         settings: "made up".to_owned(),
         resolution: 2,
         probes: 1,
-        shapes,
+        shapes: SHAPES[..2].iter().map(small_shape).collect(),
         lightfields: LightfieldOperators {
             parity: vec![0, 1],
             from_emission: filled(2, 2),
@@ -85,7 +67,28 @@ fn small() -> Dictionary {
     }
 }
 
-/// One section to write.
+/// The operators of a shape in [`small`].
+fn small_shape(shape: &'static Shape) -> ShapeOperators {
+    let texels = shape.texel_count(2);
+    let opening = OpeningOperators {
+        emission_from_coefficients: vec![filled(2, 2)],
+        joint_from_response: vec![filled(3, 2)],
+    };
+    ShapeOperators {
+        shape,
+        coefficients_from_direct: filled(2, texels),
+        joint_basis: filled(texels, 3),
+        probe_basis: filled(9, 3),
+        vector_basis: Matrix::zeros(0, 3),
+        openings: vec![opening; shape.openings.len()],
+        implicit_lighting: filled(texels, 2),
+        singular_values: vec![1.0, 0.5],
+        dropped_energy: 0.1,
+        joint_dropped_energy: 0.05,
+    }
+}
+
+/// The contents of a section.
 #[derive(Clone, Debug)]
 enum Section {
     Text(&'static str),
@@ -94,64 +97,59 @@ enum Section {
     Numbers(Vec<f32>),
 }
 
-/// Resolution, probes, shapes, variants, lightfield, emission and response modes, no vertical openings, no holes, depth
-/// of paths without and with one.
+/// The section of sizes: resolution, probes, shapes, variants, lightfield modes, emission modes, response modes, no vertical
+/// openings, no holes, depth of paths without holes and with holes.
 const SIZES: [u32; 11] = [2, 1, 2, 0, 2, 2, 2, 0, 0, 2, 0];
 
-/// The sections of [`small`], by the names that the file format gives them.
+/// Sections of a file with the sizes of [`small`], under the names that the format gives them.
 fn sections() -> Vec<(&'static str, Section)> {
     use Section::{Numbers, Parities, Sizes, Text};
-    let zeros = |count| Numbers(vec![0.25; count]);
+    let quarters = |count| Numbers(vec![0.25; count]);
     vec![
         ("preset", Text("small")),
         ("settings", Text("made up")),
         ("sizes", Sizes(SIZES.to_vec())),
-        ("dropped", zeros(3)),
+        ("dropped", quarters(3)),
         ("rlf.par", Parities(vec![0, 1])),
         ("e.par", Parities(vec![0, 1])),
         ("r.par", Parities(vec![0, 3])),
-        ("e_rlf", zeros(4)),
-        ("left", zeros(4)),
-        ("ahead", zeros(4)),
-        ("swap", zeros(0)),
-        ("T_rlf_r", zeros(4)),
+        ("e_rlf", quarters(4)),
+        ("left", quarters(4)),
+        ("ahead", quarters(4)),
+        ("swap", quarters(0)),
+        ("T_rlf_r", quarters(4)),
         ("words", Text("z zx")),
-        ("P0", zeros(4)),
-        ("P1", zeros(4)),
+        ("P0", quarters(4)),
+        ("P1", quarters(4)),
         ("shapes", Text("closed dead_end")),
         ("variants", Text("")),
-        ("corners", zeros(0)),
+        ("corners", quarters(0)),
         ("0.k", Sizes(vec![2, 3])),
-        ("0.s", zeros(2)),
-        ("0.d", zeros(2)),
-        ("0.T", zeros(48)),
-        ("0.J", zeros(72)),
-        ("0.Jp", zeros(27)),
-        ("0.Jv", zeros(0)),
-        ("0.L", zeros(48)),
+        ("0.s", quarters(2)),
+        ("0.d", quarters(2)),
+        ("0.T", quarters(48)),
+        ("0.J", quarters(72)),
+        ("0.Jp", quarters(27)),
+        ("0.Jv", quarters(0)),
+        ("0.L", quarters(48)),
         ("1.k", Sizes(vec![2, 3])),
-        ("1.s", zeros(2)),
-        ("1.d", zeros(2)),
-        ("1.T", zeros(40)),
-        ("1.J", zeros(60)),
-        ("1.Jp", zeros(27)),
-        ("1.Jv", zeros(0)),
-        ("1.L", zeros(40)),
-        ("1.E0", zeros(4)),
-        ("1.Q0", zeros(6)),
-        ("B_e", zeros(40)),
-        ("U_r", zeros(58)),
+        ("1.s", quarters(2)),
+        ("1.d", quarters(2)),
+        ("1.T", quarters(40)),
+        ("1.J", quarters(60)),
+        ("1.Jp", quarters(27)),
+        ("1.Jv", quarters(0)),
+        ("1.L", quarters(40)),
+        ("1.E0", quarters(4)),
+        ("1.Q0", quarters(6)),
+        ("B_e", quarters(40)),
+        ("U_r", quarters(58)),
     ]
 }
 
-/// A container with sound checksums, whatever its sections say.
-fn packed(sections: &[(&str, Section)]) -> Vec<u8> {
-    let mut writer = Writer::new(Format {
-        magic: *b"\x89MRT\r\n\x1a\n",
-        kind: *b"DICT",
-        version: DICTIONARY_VERSION,
-        oldest_version: 1,
-    });
+/// The bytes of a file with these sections and sound checksums.
+fn file_of(sections: &[(&str, Section)]) -> Vec<u8> {
+    let mut writer = Writer::new(dictionary_format(DICTIONARY_VERSION));
     for (name, section) in sections {
         match section {
             Section::Text(text) => writer.add_text(name, text),
@@ -164,17 +162,17 @@ fn packed(sections: &[(&str, Section)]) -> Vec<u8> {
     writer.finish()
 }
 
-/// [`sections`] with one replaced.
+/// The file of [`sections`] with one section replaced.
 fn with(name: &str, section: Section) -> Vec<u8> {
     let mut all = sections();
     let entry = all.iter_mut().find(|(n, _)| *n == name);
     entry.expect("the section is there").1 = section;
-    packed(&all)
+    file_of(&all)
 }
 
 #[test]
 fn the_small_dictionary_is_sound_before_it_is_damaged() {
-    assert_eq!(read(&packed(&sections())).expect("sound").shapes.len(), 2);
+    assert_eq!(read(&file_of(&sections())).expect("sound").shapes.len(), 2);
     let bytes = small().to_bytes().expect("it fits");
     assert_eq!(read(&bytes).expect("sound"), small());
     let mut budget = ByteBudget::new(DEFAULT_BYTE_BUDGET);
@@ -203,7 +201,7 @@ fn truncated_dictionaries_are_refused() {
 }
 
 #[test]
-fn an_empty_or_foreign_file_is_not_of_this_kind() {
+fn an_empty_or_foreign_file_is_recognised() {
     for foreign in [
         &b""[..],
         b"\x89PNG\r\n\x1a\n rest",
@@ -220,7 +218,7 @@ fn an_empty_or_foreign_file_is_not_of_this_kind() {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
+fn every_flipped_bit_is_detected() {
     let bytes = small().to_bytes().expect("it fits");
     for at in 0..bytes.len() {
         for bit in 0..8 {
@@ -244,13 +242,8 @@ fn every_flipped_bit_is_noticed() {
 }
 
 #[test]
-fn another_version_is_refused_by_its_number() {
-    let mut writer = Writer::new(Format {
-        magic: *b"\x89MRT\r\n\x1a\n",
-        kind: *b"DICT",
-        version: DICTIONARY_VERSION + 1,
-        oldest_version: 1,
-    });
+fn a_newer_version_is_refused_by_its_number() {
+    let mut writer = Writer::new(dictionary_format(DICTIONARY_VERSION + 1));
     writer.add_text("preset", "from the future").expect("legal");
     let error = read(&writer.finish()).expect_err("too new");
     let version = matches!(
@@ -294,7 +287,7 @@ fn absurd_sizes_are_refused_by_name() {
             }
         }
     }
-    // More joint modes than the limit, and fewer than the shape's own.
+    // More joint modes than the limit, and fewer than the shape has of its own.
     for joint in [MAX_MODES + 1, 1] {
         let modes = Section::Sizes(vec![2, joint as u32]);
         let error = read(&with("0.k", modes)).expect_err("absurd");
@@ -343,13 +336,13 @@ fn sections_of_the_wrong_length_or_type_are_refused() {
 #[test]
 fn missing_sections_are_refused_by_name() {
     for (k, (name, _)) in sections().into_iter().enumerate() {
-        // Without it the dictionary is a packed one.
+        // A dictionary without sources is sound: it is a packed one.
         if name == "B_e" {
             continue;
         }
         let mut all = sections();
         all.remove(k);
-        match read(&packed(&all)) {
+        match read(&file_of(&all)) {
             Err(DictionaryError::Container(ContainerError::MissingSection { name: found })) => {
                 assert_eq!(found, name);
             }
@@ -359,14 +352,14 @@ fn missing_sections_are_refused_by_name() {
 }
 
 #[test]
-fn numbers_that_are_none_are_refused() {
+fn numbers_that_are_not_finite_are_refused() {
     for (name, section) in sections() {
         let Section::Numbers(numbers) = section else {
             continue;
         };
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let mut numbers = numbers.clone();
-            // An empty one that has a number is of the wrong length before it is anything else.
+            // A number in an empty section would be refused for the length of the section.
             let Some(last) = numbers.last_mut() else {
                 continue;
             };
@@ -400,7 +393,7 @@ fn unknown_and_repeated_shapes_are_refused() {
 }
 
 #[test]
-fn words_and_parities_that_are_none_are_refused() {
+fn malformed_words_and_parities_are_refused() {
     for words in [
         "x",
         "zy",
@@ -427,7 +420,7 @@ fn words_and_parities_that_are_none_are_refused() {
 }
 
 #[test]
-fn a_closed_cube_alone_is_a_dictionary() {
+fn a_dictionary_may_hold_the_closed_cube_alone() {
     let mut alone = small();
     alone.shapes.truncate(1);
     let bytes = alone.to_bytes().expect("it fits");
@@ -435,7 +428,7 @@ fn a_closed_cube_alone_is_a_dictionary() {
 }
 
 #[test]
-fn a_small_budget_is_kept() {
+fn a_small_budget_is_never_exceeded() {
     let bytes = small().to_bytes().expect("it fits");
     let enough = (0..20_000)
         .step_by(50)
@@ -451,7 +444,7 @@ fn a_small_budget_is_kept() {
         );
         assert!(limit, "{size}: {error}");
     }
-    // What was promised is all that counts: 4 bytes a number, not more than the file.
+    // A number takes 4 bytes of the budget, however few it takes in the file.
     let matrices = default_dictionary().bytes() as u64;
     let spent = Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(matrices / 2));
     assert!(spent.is_err());
@@ -459,12 +452,11 @@ fn a_small_budget_is_kept() {
 
 #[test]
 fn a_dictionary_that_lacks_a_shape_says_which() {
-    let mut packed = default_dictionary().clone();
-    packed.shapes.retain(|entry| entry.shape.name != "straight");
-    let level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-    let error = Scene::assemble(&level, &packed, &AssembleConfig::default())
-        .map(|_| ())
-        .expect_err("incomplete");
+    let mut incomplete = default_dictionary().clone();
+    incomplete
+        .shapes
+        .retain(|entry| entry.shape.name != "straight");
+    let error = refusal(&floor_plan(&corridor(3), 0.5), &incomplete);
     let missing = matches!(
         error,
         AssembleError::MissingShape {

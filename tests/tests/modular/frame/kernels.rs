@@ -1,18 +1,17 @@
-//! Instructions and storage: each level against the scalar reference, and kept numbers against `f32`.
+//! Kernels of frames: every instruction set against the scalar reference, and stored operators against those in `f32`.
 
 use glam::Vec3;
 use mrt_core::simd::SimdLevel;
 use mrt_core::storage::Storage;
 use mrt_runtime::blocks::maze;
 use mrt_runtime::{
-    AssembleConfig, Bounces, Dictionary, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder,
-    Scene,
+    AssembleConfig, Bounces, Dictionary, Frame, FrameConfig, Light, Outputs, ProbeOrder, Scene,
 };
-use mrt_tests::FrameForTests;
-use mrt_tests::sequences::{
-    STORAGES, mobile_dictionary, outputs, random_level, random_lights, stored, vector_dictionary,
+use mrt_tests::{
+    FrameForTests, Random, configured, corridor, default_dictionary, floor_plan, mobile_dictionary,
+    outputs, random_level, random_lights, random_position, relative_difference, relative_l2,
+    scene_of, solved, stored, vector_dictionary,
 };
-use mrt_tests::{Random, by_texel, default_dictionary, largest_difference};
 
 const OUTPUTS: Outputs = Outputs {
     lightmap: true,
@@ -29,27 +28,23 @@ fn frame_of(scene: &Scene, simd: SimdLevel) -> Frame {
     Frame::new(scene, config)
 }
 
-/// Lanes add up in another order: a few roundings of `f32`, of the largest number. Measured: 8e-7 at
-/// most, over twelve bounces.
+/// Largest difference, relative to the largest number of an output: a few roundings of `f32`, since vector instructions
+/// sum in another order. Measured over twelve bounces: 8e-7.
 const ROUNDING: f64 = 3e-6;
 
-/// Largest difference of each output from the scalar reference's, over its largest number.
-fn apart(frame: &Frame, scalar: &Frame) -> Vec<(&'static str, f64)> {
-    let pairs = outputs(frame).into_iter().zip(outputs(scalar));
-    pairs
-        .map(|((name, a), (_, b))| {
-            let triples = |x: &[f32]| x.iter().map(|&x| [x; 3]).collect::<Vec<_>>();
-            (name, largest_difference(&triples(&a), &triples(&b)))
-        })
-        .collect()
+/// Relative difference of each output from the scalar reference.
+fn apart(frame: &Frame, scalar: &Frame) -> [(&'static str, f64); 6] {
+    let [ours, theirs] = [frame, scalar].map(outputs);
+    std::array::from_fn(|k| (ours[k].0, relative_difference(&ours[k].1, &theirs[k].1)))
 }
 
-fn compare_levels(dictionary: &Dictionary, blocks: usize, seeds: u64) {
+/// Compares all instruction sets and storages on random levels.
+fn compare_instruction_sets(dictionary: &Dictionary, blocks: usize, seeds: u64) {
     let mut worst = [("", 0.0f64); 6];
     for seed in 0..seeds {
         let mut random = Random(seed);
         let level = random_level(&mut random, blocks);
-        for storage in STORAGES {
+        for storage in Storage::ALL {
             let scene = stored(&level, dictionary, storage);
             let lights: Vec<Light> = random_lights(&mut random, &level, &scene, 5);
             for bounces in [Bounces::Count(1), Bounces::Count(12)] {
@@ -74,56 +69,45 @@ fn compare_levels(dictionary: &Dictionary, blocks: usize, seeds: u64) {
 }
 
 #[test]
-fn levels_agree_with_the_scalar_reference_on_mobile_operators() {
-    compare_levels(mobile_dictionary(), 20, 12);
+fn instruction_sets_agree_with_the_scalar_reference_on_mobile_operators() {
+    compare_instruction_sets(mobile_dictionary(), 20, 12);
 }
 
 #[test]
-fn levels_agree_with_the_scalar_reference_on_standard_operators() {
-    compare_levels(default_dictionary(), 9, 2);
+fn instruction_sets_agree_with_the_scalar_reference_on_standard_operators() {
+    compare_instruction_sets(default_dictionary(), 9, 2);
 }
 
 #[test]
-fn levels_agree_with_the_scalar_reference_on_vector_irradiance() {
-    compare_levels(vector_dictionary(), 6, 4);
+fn instruction_sets_agree_with_the_scalar_reference_on_vector_irradiance() {
+    compare_instruction_sets(vector_dictionary(), 6, 4);
 }
 
-/// Relative difference in L2.
-fn l2_apart(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
-    let sum = |x: &mut dyn Iterator<Item = f32>| x.map(|x| f64::from(x).powi(2)).sum::<f64>();
-    let (a, b) = (a.as_flattened(), b.as_flattened());
-    let apart = sum(&mut a.iter().zip(b).map(|(a, b)| a - b));
-    (apart / sum(&mut b.iter().copied())).sqrt()
-}
-
-/// What is kept of operators, against all of them in `f32`, relative L2 over a maze of 41 blocks with four lamps.
-///
-/// Bounds are about twice what was measured: `f16` 1.1e-4 for transport and nothing for shapes, which the dictionary has in
-/// `f16` already, `int8` 6e-3, `negligible` 2.1e-4 at 3e-3 and 1.6e-3 at 1e-2.
+/// Bounds are relative L2 errors over a maze of 41 blocks with four lamps, about twice the measured ones. Measured: `f16`
+/// 1.1e-4 for transport and 0 for shapes, which the dictionary has in `f16` already; `int8` 6e-3; `negligible` 2.1e-4 at
+/// 3e-3 and 1.6e-3 at 1e-2.
 #[test]
-fn stored_operators_err_as_stated() {
+fn stored_operators_change_light_by_less_than_stated() {
     let level = maze(41, Vec3::new(0.7, 0.5, 0.3), 7);
-    let solved = |shape_storage, transport_storage, negligible, bounces| {
+    let lit = |shape_storage, transport_storage, negligible, bounces| {
         let config = AssembleConfig {
             shape_storage,
             transport_storage,
             negligible: Some(negligible),
             ..AssembleConfig::default()
         };
-        let scene = Scene::assemble(&level, default_dictionary(), &config).expect("the level fits");
+        let scene = configured(&level, default_dictionary(), &config);
         let mut random = Random(2);
         let lights: Vec<Light> = (0..4)
             .map(|_| {
-                let position = mrt_tests::sequences::random_position(&mut random, &level);
-                mrt_tests::sphere(position, 0.1, Vec3::new(1.0, 0.5, 0.25))
+                let position = random_position(&mut random, &level, 0.0);
+                Light::sphere(position, 0.1, Vec3::new(1.0, 0.5, 0.25))
             })
             .collect();
-        let mut frame = Frame::new(&scene, FrameConfig::default());
-        frame.light_with(&lights, bounces);
-        by_texel(&scene, &frame.indirect())
+        solved(&scene, &lights, bounces).indirect()
     };
     for bounces in [Bounces::Count(1), Bounces::Count(10)] {
-        let exact = solved(Storage::F32, Storage::F32, 0.0, bounces);
+        let exact = lit(Storage::F32, Storage::F32, 0.0, bounces);
         for (shapes, transport, negligible, bound) in [
             (Storage::F16, Storage::F32, 0.0, 1e-6),
             (Storage::F32, Storage::F16, 0.0, 2.5e-4),
@@ -135,7 +119,7 @@ fn stored_operators_err_as_stated() {
             (Storage::F32, Storage::F32, 1e-2, 3e-3),
             (Storage::F32, Storage::F16, 3e-3, 6e-4),
         ] {
-            let apart = l2_apart(&solved(shapes, transport, negligible, bounces), &exact);
+            let apart = relative_l2(&lit(shapes, transport, negligible, bounces), &exact);
             println!("{bounces:?} {shapes:?} {transport:?} {negligible}: {apart:.1e}");
             assert!(
                 apart < bound,
@@ -146,20 +130,19 @@ fn stored_operators_err_as_stated() {
 }
 
 #[test]
-fn mirrors_that_would_fold_padding_are_left_out() {
-    // A straight block has three mirrors: 16² texels make orbits of eight, and at 6² and 5² nearly half of eight times 32
-    // slots would be padding.
-    let level = Level::from_cells(&[[0, 0, 0], [1, 0, 0], [2, 0, 0]], Vec3::ONE).expect("a row");
+fn mirrors_that_would_mostly_fold_padding_are_left_out() {
+    // A straight block has three mirrors. They fold 16² texels a wall well. At 6² and 5², nearly half of eight times 32 slots
+    // would be padding, so that one mirror is left out.
+    let level = floor_plan(&corridor(3), 1.0);
     for (dictionary, mirrors, slots) in [
         (default_dictionary(), 3, 4 * 16 * 16),
         (mobile_dictionary(), 2, 4 * 48),
         (vector_dictionary(), 2, 4 * 32),
     ] {
-        let scene =
-            Scene::assemble(&level, dictionary, &AssembleConfig::default()).expect("it fits");
+        let scene = scene_of(&level, dictionary);
         let folding = &scene.shapes[scene.blocks[1].shape_index].folding;
         assert_eq!((folding.mirrors, folding.slots()), (mirrors, slots));
-        // Tiles of T_b->r need it.
+        // Tiles of T_b->r need the mirror that exchanges up and down.
         assert!(folding.up_mirror.is_some_and(|k| k < folding.mirrors));
     }
 }

@@ -1,5 +1,5 @@
-//! Reference files that are damaged, or meant to do damage: each is refused by the right error, in one
-//! sentence that names the file, what is wrong, what was expected and what was found.
+//! Damaged and malicious reference files are refused by the right error. Its message is one sentence with the file, the
+//! fault, what was expected and what was found.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::oracle_file::{Kind, ReferenceError, read};
 use serde_json::{Value, json};
 
-/// Two cells, two bounces of 2 x 2 texels on ten walls, for one light.
+/// The description of a sound file: two cells, one light, direct light and one bounce at 2 x 2 texels on ten walls.
 fn sound() -> Value {
     let walls: Vec<Value> = (0..2)
         .flat_map(|x| Face::ALL.map(|face| (x, face)))
@@ -77,7 +77,7 @@ fn a_sound_file_reads_back() {
         file.indirect_irradiance(0, ReferenceBounces::Count(2), 0.5)
             .is_err()
     );
-    // Two terms are too few to continue from.
+    // Two terms are too few to estimate the bounces beyond them.
     assert!(
         file.indirect_irradiance(0, ReferenceBounces::All, 0.5)
             .is_err()
@@ -106,7 +106,7 @@ fn data_of_the_wrong_length_is_refused() {
 }
 
 #[test]
-fn data_that_is_no_irradiance_is_refused() {
+fn data_that_cannot_be_irradiance_is_refused() {
     for bad in [f32::NAN, f32::INFINITY, -1.0] {
         let mut data = values(80);
         data[68..72].copy_from_slice(&bad.to_le_bytes());
@@ -116,7 +116,7 @@ fn data_that_is_no_irradiance_is_refused() {
 }
 
 #[test]
-fn text_that_is_no_description_is_refused() {
+fn text_that_does_not_describe_a_reference_is_refused() {
     let deep = "[".repeat(100_000);
     let cut = &sound().to_string()[..90];
     let huge_number = sound()

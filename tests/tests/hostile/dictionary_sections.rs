@@ -1,23 +1,15 @@
-//! Dictionary files with sound checksums and wrong contents, in every storage and version: errors, no panic.
+//! Dictionary files with sound checksums and wrong sections, of every version and storage, give errors and no panic.
 
-use mrt_core::container::{ByteBudget, Container, ElementType, Format, Writer};
+use mrt_core::container::{ByteBudget, Container, ElementType, Writer};
 use mrt_core::storage::{Storage, f16};
 use mrt_runtime::blocks::WarpTransport;
 use mrt_runtime::low_level::modular::dictionary::{StoredDictionary, Variant};
-use mrt_runtime::{AssembleConfig, Coupling, Dictionary, DictionaryError, Scene};
-use mrt_tests::{Random, floor_plan};
+use mrt_runtime::{AssembleConfig, Dictionary, DictionaryError, Scene};
+use mrt_tests::{COUPLINGS, MOBILE_BYTES, OLDEST_BYTES, Random, dictionary_format, floor_plan};
 
 const BYTE_BUDGET: u64 = 64 << 20;
 
-const fn format(version: u32) -> Format {
-    Format {
-        magic: *b"\x89MRT\r\n\x1a\n",
-        kind: *b"DICT",
-        version,
-        oldest_version: 1,
-    }
-}
-
+/// What a section holds.
 #[derive(Clone, Debug)]
 enum Content {
     Text(String),
@@ -28,7 +20,7 @@ enum Content {
     U32(Vec<u32>),
 }
 
-/// A file taken apart.
+/// A file as a list of its sections.
 #[derive(Clone)]
 struct Parts {
     version: u32,
@@ -38,7 +30,7 @@ struct Parts {
 impl Parts {
     fn of(bytes: &[u8]) -> Self {
         let mut budget = ByteBudget::new(BYTE_BUDGET);
-        let container = Container::read(bytes, &format(2), &mut budget).expect("sound");
+        let container = Container::read(bytes, &dictionary_format(2), &mut budget).expect("sound");
         let mut numbers = ByteBudget::new(BYTE_BUDGET);
         let mut content = |name, element_type| match element_type {
             ElementType::Text => Content::Text(container.text(name).expect("text").to_owned()),
@@ -59,7 +51,7 @@ impl Parts {
     }
 
     fn bytes(&self) -> Vec<u8> {
-        let mut writer = Writer::new(format(self.version));
+        let mut writer = Writer::new(dictionary_format(self.version));
         for (name, content) in &self.sections {
             match content {
                 Content::Text(text) => writer.add_text(name, text),
@@ -92,15 +84,15 @@ fn read(bytes: &[u8]) -> Result<Dictionary, DictionaryError> {
     Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(BYTE_BUDGET))
 }
 
-/// Files of both versions, the newer one with variants and in every storage.
+/// A file of the oldest version, and files of the newest with variants, one for each storage.
 fn files() -> Vec<Parts> {
-    let mut dictionary = read(include_bytes!("../../../assets/versions/2.mrt")).expect("sound");
+    let mut dictionary = read(MOBILE_BYTES).expect("sound");
     dictionary.variants.push(Variant {
         transport: WarpTransport::Rebuilt,
         corners: [[0.5; 3]; 8],
         operators: dictionary.shapes[1].clone(),
     });
-    let mut files = vec![Parts::of(include_bytes!("../../../assets/versions/1.mrt"))];
+    let mut files = vec![Parts::of(OLDEST_BYTES)];
     for storage in Storage::ALL {
         let bytes = dictionary.stored_as(storage).to_bytes().expect("it fits");
         files.push(Parts::of(&bytes));
@@ -109,7 +101,7 @@ fn files() -> Vec<Parts> {
 }
 
 #[test]
-fn files_taken_apart_and_joined_are_the_same() {
+fn files_written_again_from_their_sections_are_sound() {
     for parts in files() {
         read(&parts.bytes()).expect("sound");
     }
@@ -122,14 +114,14 @@ fn every_section_is_needed() {
             let mut damaged = parts.clone();
             let (name, _) = damaged.sections.remove(at);
             let result = read(&damaged.bytes());
-            // Without sources a dictionary is a packed one.
+            // A dictionary without sources is sound: it is a packed one.
             assert_eq!(result.is_ok(), name == "B_e", "{name}: {:?}", result.err());
         }
     }
 }
 
 #[test]
-fn sections_have_the_length_that_the_sizes_ask_for() {
+fn sections_longer_than_the_sizes_say_are_refused() {
     for parts in files() {
         for (name, content) in &parts.sections {
             if let Content::Text(_) = content {
@@ -149,7 +141,7 @@ fn sections_have_the_length_that_the_sizes_ask_for() {
 }
 
 #[test]
-fn numbers_that_decode_to_no_number_are_refused() {
+fn numbers_that_are_not_finite_are_refused() {
     for parts in files() {
         for (name, content) in &parts.sections {
             match content {
@@ -176,7 +168,7 @@ fn numbers_that_decode_to_no_number_are_refused() {
                 }
                 _ => {}
             }
-            // The scales of whatever has some.
+            // Scales of `int8` sections.
             if name.ends_with('*') && !matches!(content, Content::F32(scales) if scales.is_empty())
             {
                 for bad in [0.0, -1.0, f32::INFINITY, f32::MAX, 1e-40] {
@@ -192,10 +184,9 @@ fn numbers_that_decode_to_no_number_are_refused() {
 }
 
 #[test]
-fn sizes_are_bounded() {
+fn sizes_out_of_bounds_are_refused() {
     for parts in files() {
-        let mut parts_copy = parts.clone();
-        let Content::U32(sizes) = parts_copy.get("sizes").clone() else {
+        let Content::U32(sizes) = parts.clone().get("sizes").clone() else {
             panic!("sizes are u32");
         };
         for at in 0..sizes.len() {
@@ -211,7 +202,7 @@ fn sizes_are_bounded() {
 }
 
 #[test]
-fn variants_are_named_by_shape_and_transport() {
+fn variants_without_a_known_shape_and_transport_are_refused() {
     let parts = files().pop().expect("there are four");
     for bad in [
         "",
@@ -234,7 +225,7 @@ fn variants_are_named_by_shape_and_transport() {
 }
 
 #[test]
-fn shapes_of_version_1_are_those_of_its_time() {
+fn version_1_has_only_the_shapes_of_its_time() {
     let parts = &files()[0];
     for bad in ["sphere", "open", "door"] {
         let error = parts.refused("0.name", |content| *content = Content::Text(bad.to_owned()));
@@ -250,7 +241,7 @@ fn shapes_of_version_1_are_those_of_its_time() {
 }
 
 #[test]
-fn a_turn_to_the_right_that_is_no_mirror_image_is_refused() {
+fn a_right_turn_that_does_not_mirror_the_left_turn_is_refused() {
     let error = files()[0].refused("right", |content| {
         if let Content::F32(numbers) = content {
             numbers[70] *= 1.5;
@@ -269,9 +260,8 @@ fn a_turn_to_the_right_that_is_no_mirror_image_is_refused() {
     );
 }
 
-/// What a small budget does not allow is not read, and never exceeded.
 #[test]
-fn budgets_are_kept() {
+fn a_budget_is_never_exceeded() {
     for parts in files() {
         let bytes = parts.bytes();
         let needed = {
@@ -287,7 +277,8 @@ fn budgets_are_kept() {
     }
 }
 
-/// Random changes behind sound checksums: a level is lit by what is read, or there is an error.
+/// A dictionary with random changes behind sound checksums is refused, or a level is assembled with it, or assembly refuses
+/// it.
 #[test]
 fn random_damage_causes_no_panic() {
     let mut random = Random(12);
@@ -304,12 +295,12 @@ fn random_damage_causes_no_panic() {
             let Ok(dictionary) = StoredDictionary::read(&bytes, &mut budget) else {
                 continue;
             };
-            for coupling in [Coupling::Table, Coupling::Lightfield] {
+            for coupling in COUPLINGS {
                 let config = AssembleConfig {
                     coupling,
                     ..AssembleConfig::default()
                 };
-                // A damaged dictionary may lack what the level needs.
+                // An error is allowed: a damaged dictionary may lack what the level needs.
                 let _ = Scene::assemble(&level, &dictionary, &config);
             }
         }
