@@ -1,4 +1,4 @@
-//! Brings each block of a level to its canonical frame, and finds what lies beyond its openings.
+//! Brings each block of a level to its canonical frame, and finds its neighbours beyond its openings.
 
 use crate::level::block::{Level, Opening, corner_index};
 use crate::level::block_grid::BlockGrid;
@@ -18,7 +18,7 @@ use mrt_core::geometry::polar_decomposition::rotation_part;
 /// The blocks of a checked level in their canonical frames, with `dictionary.resolution`² texels a wall.
 ///
 /// # Errors
-/// [`AssembleError::RolledInterface`].
+/// [`AssembleError::RolledInterface`], if the dictionary does not support how two blocks are turned against each other.
 pub(crate) fn place_level<M>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -71,7 +71,7 @@ pub(crate) fn place_level<M>(
     })
 }
 
-/// What modular transport adds to each block: which operators it uses, and its parts of the coefficients.
+/// Data of modular transport for each block: its operators, and its ranges of coefficients.
 pub(super) fn scene_blocks(
     level: &Level,
     used: &[&ShapeOperators<impl OperatorMatrix>],
@@ -89,7 +89,7 @@ pub(super) fn scene_blocks(
             joint: joint - joint_modes..joint,
             world_from_probe: match block.transport {
                 WarpTransport::Canonical => rotation_of(&block.canonical_warp()),
-                // A variant's probes have the level's axes, turned back by the orientation alone.
+                // Probes of a variant have the axes of the level, turned back by the orientation.
                 _ => rotation_matrix(block.orientation),
             },
         }
@@ -116,12 +116,12 @@ fn crossing(
         _ => None,
     };
     let up = images[1];
-    // Holes know which way is up, and so do dictionaries whose shapes open sideways only.
+    // +y must stay up for holes, and for dictionaries whose shapes open sideways only.
     let outline = level.blocks[here.block].shape.opening(face_here);
     let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
     let keeps_up = match up {
         Some(Face::PosY) => true,
-        // Half a turn is two mirrors; a dictionary of version 1 does not know its modes' parities.
+        // Half a turn is a product of two mirrors; dictionaries of version 1 do not have the parities of modes under both.
         Some(Face::NegY) => !has_hole && dictionary.knows_parities(),
         _ => dictionary.has_exchanges() && !has_hole,
     };
@@ -171,13 +171,13 @@ fn images_of_axes(
     images
 }
 
-/// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the
-/// middle, by Newton's iteration for the polar decomposition (Higham 1986).
+/// The rotation from canonical axes to world axes: the orthogonal matrix nearest to the derivative of the warp at its middle, by Newton's
+/// iteration for the polar decomposition (Higham 1986).
 fn rotation_of(warp: &Hexahedron) -> DMat3 {
     rotation_part(&warp.jacobian(DVec3::splat(0.5)), POLAR_STEPS)
 }
 
-/// Steps of the polar decomposition: warps that pass the level's check are stretched by up to 1e6.
+/// Steps of the polar decomposition: enough for warps that are stretched by 1e6, the most that the check of a level accepts.
 const POLAR_STEPS: usize = 40;
 
 fn rotation_matrix(rotation: CubeRotation) -> DMat3 {

@@ -1,4 +1,4 @@
-//! Reads version 2.
+//! Reads dictionary files of version 2.
 
 use crate::level::shape::{Hole, SHAPES, Shape};
 use crate::level::warp_transport::WarpTransport;
@@ -64,7 +64,7 @@ pub(super) fn read<'a>(
     })
 }
 
-/// The section `sizes`.
+/// Content of the section `sizes`.
 struct Sizes {
     resolution: usize,
     probes: usize,
@@ -103,18 +103,19 @@ impl Sizes {
         })
     }
 
+    /// Rows of a basis of probes: nine coefficients for each probe.
     fn probe_rows(&self) -> usize {
         9 * self.probes * self.probes * self.probes
     }
 }
 
-/// The words of a text, which must be so many.
+/// The words of a text section, which must be exactly `expected`.
 fn listed<'t>(
     section: &str,
     text: &'t str,
     expected: usize,
 ) -> Result<Vec<&'t str>, DictionaryError> {
-    // One more than expected shows that there are too many, and bounds what is allocated.
+    // One word more than expected shows that there are too many, and limits the memory.
     let words: Vec<&str> = text.split_ascii_whitespace().take(expected + 1).collect();
     if words.len() == expected {
         Ok(words)
@@ -239,7 +240,7 @@ fn read_variants<'a>(
 fn variant_of_name(name: &str, shapes: &[Operators]) -> Option<(WarpTransport, &'static Shape)> {
     let (shape, transport) = name.split_once(':')?;
     let shape = shapes.iter().find(|entry| entry.shape.name == shape)?.shape;
-    // Round tubes have none.
+    // Round tubes have no variants.
     if shape.tube().is_some() {
         return None;
     }

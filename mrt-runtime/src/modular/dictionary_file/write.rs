@@ -1,4 +1,4 @@
-//! Writes version 2.
+//! Writes dictionary files of version 2.
 
 use crate::modular::dictionary::{
     Dictionary, LightfieldOperators, OperatorKind, OperatorMatrix, PathTable, ShapeOperators,
@@ -10,14 +10,14 @@ use mrt_core::container::{ContainerError, Writer};
 use mrt_core::storage::write_stored;
 
 impl<M: OperatorMatrix> Dictionary<M> {
-    /// The bytes of a dictionary file, matrices as they are stored here; the same dictionary gives the same bytes.
+    /// The bytes of a dictionary file, with matrices in their present number formats. The same dictionary gives the same bytes.
     ///
     /// # Errors
-    /// [`DictionaryError::Container`], if there are more matrices than the container has room for, and
-    /// [`DictionaryError::Size`] for more than [`MAX_VARIANTS`] variants.
+    /// [`DictionaryError::Container`], if there are more matrices than a container can hold; [`DictionaryError::Size`], if there are more
+    /// than [`MAX_VARIANTS`] variants.
     ///
     /// # Panics
-    /// If an element is infinite or not a number.
+    /// If an element is infinite or NaN.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DictionaryError> {
         check_size("number of variants", self.variants.len(), 0, MAX_VARIANTS)?;
         let mut writer = Writer::new(FORMAT);

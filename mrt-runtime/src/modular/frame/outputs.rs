@@ -1,4 +1,4 @@
-//! Lightmap, probes and vector irradiance: filled where indirect light was written.
+//! Fills lightmap, probes and vector irradiance of blocks whose indirect light changed.
 
 use crate::modular::frame::config::FrameConfig;
 use crate::modular::frame::light_buffers::LightBuffers;
@@ -11,13 +11,13 @@ use crate::output::probes::Probes;
 use crate::output::texel_layout::BlockRank;
 use mrt_core::simd::SimdLevel;
 
-/// What a frame gives besides irradiance at texels.
+/// The outputs of a frame besides irradiance at texels.
 #[derive(Debug)]
 pub(super) struct OutputBuffers {
-    /// Empty if not asked for.
+    /// Pixels of the atlas; empty if not asked for.
     pub lightmap: Vec<[f32; 3]>,
     pub probes: Option<Probes>,
-    /// Four coefficients a texel, three channels; empty if not asked for.
+    /// Four coefficients for each texel and channel; empty if not asked for.
     pub vector: Vec<f32>,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct OutputStage<'a> {
 }
 
 impl OutputBuffers {
-    /// Darkness in everything asked for that the dictionary was baked with.
+    /// Dark outputs: those that the settings ask for and the dictionary was baked with.
     pub(super) fn new(scene: &SceneData, config: &FrameConfig) -> Self {
         let outputs = config.outputs;
         let pixels = if outputs.lightmap {
@@ -54,7 +54,7 @@ impl OutputBuffers {
         }
     }
 
-    /// Takes all light from probes and vector irradiance.
+    /// Sets probes and vector irradiance to 0.
     pub(super) fn darken(&mut self) {
         self.vector.fill(0.0);
         if let Some(probes) = &mut self.probes {
@@ -62,7 +62,7 @@ impl OutputBuffers {
         }
     }
 
-    /// Brings everything up to date for the blocks that changed, and lists them.
+    /// Brings the outputs of all changed blocks up to date, and lists those blocks in the report.
     pub(super) fn fill(&mut self, stage: OutputStage<'_>) {
         let OutputStage {
             scene,

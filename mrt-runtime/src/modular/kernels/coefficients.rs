@@ -15,20 +15,20 @@ pub(crate) struct CoefficientsOf<'a> {
     pub direct: [&'a [f32]; CHANNELS],
     pub indirect: Option<[&'a [f32]; CHANNELS]>,
     pub albedo: [&'a [f32]; CHANNELS],
-    /// The albedo of all texels, if they have the same.
+    /// The albedo of all texels, if it is the same for all.
     pub uniform: Option<Vec3>,
     pub emission: Option<[&'a [f32]; CHANNELS]>,
     pub scratch: &'a mut Scratch,
-    /// Channel by channel; numbers at rows that belong to none of them are zero, and stay so.
+    /// Output, channel by channel. Rows without a coefficient b are zero, and stay zero.
     pub coefficients: &'a mut [f32],
 }
 
-/// What left a block's walls.
+/// Flux that left the walls of a block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sent {
-    /// All of it.
+    /// All flux.
     pub all: Flux,
-    /// Reflected direct light, and emission.
+    /// The part that is reflected direct light, and emission.
     pub fresh: Flux,
 }
 
@@ -53,7 +53,7 @@ impl Kernel for CoefficientsOf<'_> {
 }
 
 impl CoefficientsOf<'_> {
-    /// The albedo that sums are multiplied by, instead of each texel's light.
+    /// The albedo that multiplies sums of light, where no texel's light needs to be multiplied; `None` otherwise.
     #[inline(always)]
     fn later(&self) -> Option<[f32; CHANNELS]> {
         match (self.uniform, self.emission) {
@@ -119,7 +119,7 @@ fn coefficients<L: Lanes, E: PackedNumber>(l: L, rows: &[E], block: &mut Coeffic
                     to[usize::from(row)] = scaled;
                 }
             } else {
-                // A group of fewer rows writes zeros to those that follow; their own groups come later.
+                // A group that is not full writes zeros to the rows after it; the groups of those rows come later.
                 let first = usize::from(group.rows[0]);
                 to[first..first + DOT_ROWS].copy_from_slice(&scaled);
             }

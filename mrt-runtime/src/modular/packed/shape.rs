@@ -1,4 +1,4 @@
-//! The operators of one shape, folded and packed.
+//! Folded and packed operators of one shape.
 
 use crate::level::shape::Shape;
 use crate::modular::packed::folding::{Classes, Folding};
@@ -11,82 +11,83 @@ use mrt_core::simd::tiles::{ColumnLists, HALF_TILE, TILE};
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
-/// Operators of a shape as frames read them.
+/// The operators of a shape as frames read them.
 #[derive(Clone, Debug)]
 pub struct PackedShape {
-    /// Where texels are kept.
+    /// The slots of texels.
     pub folding: Folding,
     /// Number of modes `k_b`.
     pub modes: usize,
     /// Number of joint modes.
     pub joint_modes: usize,
-    /// Rows that there are coefficients for, a channel: joint modes and padding. Coefficients b take those of the joint
-    /// modes that are theirs, and all others are zero.
+    /// Number of rows of coefficients in each channel: joint modes and padding. A coefficient b is in the row of its joint mode; the other
+    /// rows of coefficients b are zero.
     ///
-    /// Modes of one class stand together: light that goes from block to block keeps its parity under the mirrors that the
-    /// blocks share, and then half of a tile's columns or more are zero.
+    /// Modes of one class have neighbouring rows. Light that goes from block to block keeps its parity under the mirrors that the blocks
+    /// share, so half of the columns of a tile, or more, are zero and left out.
     pub rows: usize,
-    /// By joint mode: its row. The first joint modes are those of coefficients b.
+    /// By joint mode: its row. The first joint modes belong to coefficients b.
     pub(crate) row_of_mode: Vec<u16>,
-    /// `u16::MAX` for padding.
+    /// By row: its joint mode; `u16::MAX` for padding.
     mode_of_row: Vec<u16>,
-    /// `T_d->b`, in groups of rows of one class; each row has one number an orbit.
+    /// `T_d->b` in groups of rows; each row has one number for each orbit.
     pub(crate) from_direct: PackedNumbers,
     pub(crate) groups: Vec<Group>,
-    /// The joint basis: tile after tile of orbits, in a tile one column a mode, class after class.
+    /// The joint basis: tile after tile of orbits, in a tile one column for each mode, class after class.
     pub(crate) joint: PackedNumbers,
     /// By class: the rows of its joint modes.
     pub(crate) joint_classes: Vec<Range<usize>>,
-    /// What coefficients are multiplied by, by row; empty if by 1.
+    /// By row: the scale that multiplies joint coefficients before the joint basis; empty if all are 1.
     pub(crate) joint_scales: Vec<f32>,
-    /// All rows.
+    /// Tiles that cover all rows.
     pub(crate) row_tiles: Vec<RowTile>,
-    /// By joint mode: a power of two near the size of its light. Responses are stored in such units, so that strong modes
-    /// do not take all the digits.
+    /// By joint mode: a power of two near the norm of its light. Transport is stored in these units, so that strong modes do not use up
+    /// the digits of weak ones.
     pub(crate) units: Vec<f32>,
-    /// By row: one over the unit of its mode.
+    /// By row: 1 / the unit of its mode; 0 for padding.
     pub(crate) row_inverses: Aligned<f32>,
-    /// By row: the largest number of its mode, at texels and among the coefficients of probes and of vector irradiance.
+    /// By row: the largest magnitude in its mode, over texels and the coefficients of probes and of vector irradiance.
     pub(crate) peaks: Aligned<f32>,
-    /// Area of the walls, in units of a canonical texel's.
+    /// Area of the walls, in areas of a canonical texel.
     pub(crate) area: f32,
-    /// Size of the light of each joint mode, and of the light that makes each coefficient.
+    /// By joint mode: norm of its light.
     pub(crate) joint_norms: Vec<f32>,
+    /// By coefficient b: norm of its row of `T_d->b`.
     pub(crate) coefficient_norms: Vec<f32>,
-    /// SH coefficients of probes, coefficient by coefficient and in that probe by probe.
+    /// SH coefficients of probes: for each coefficient, probe by probe.
     pub(crate) probes: Tiled,
-    /// Vector irradiance, texel by texel and in that coefficient by coefficient.
+    /// Vector irradiance: for each texel, coefficient by coefficient.
     pub(crate) vector: Tiled,
 }
 
 /// Rows that are computed together.
 #[derive(Clone, Copy, Debug)]
 pub struct RowTile {
-    /// The first.
+    /// The first row.
     pub start: u16,
-    /// How many: [`TILE`], or [`HALF_TILE`].
+    /// Number of rows: [`TILE`] or [`HALF_TILE`].
     pub height: u8,
 }
 
-/// Up to [`DOT_ROWS`] modes of one class, or that many of several.
+/// Up to [`DOT_ROWS`] modes of one class, or exactly [`DOT_ROWS`] modes of several classes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Group {
-    /// How many.
+    /// Number of modes.
     pub count: u8,
-    /// Whether they are of several classes; else they have consecutive rows.
+    /// Whether the modes are not consecutive rows of one class.
     pub is_mixed: bool,
-    /// The class of each.
+    /// Class of each mode.
     pub classes: [u8; DOT_ROWS],
-    /// The row of each.
+    /// Row of each mode.
     pub rows: [u16; DOT_ROWS],
-    /// The scale of each.
+    /// Scale of each mode.
     pub scales: [f32; DOT_ROWS],
 }
 
-/// A matrix in tiles, all of whose columns are used.
+/// A matrix in tiles that use all columns.
 #[derive(Clone, Debug)]
 pub struct Tiled {
-    /// Rows before padding.
+    /// Number of rows without padding.
     pub rows: usize,
     pub(crate) values: PackedNumbers,
     pub(crate) columns: ColumnLists,
@@ -94,7 +95,7 @@ pub struct Tiled {
 }
 
 impl Tiled {
-    /// Packs a matrix with a column for each joint mode, of whose rows `row(k)` is number k.
+    /// Packs a matrix with one column for each joint mode. Packed row k is row `row(k)` of the matrix.
     fn new(
         matrix: &Matrix<f32>,
         row: impl Fn(usize) -> usize,
@@ -137,7 +138,7 @@ pub struct Operators<'a> {
     pub probe_basis: &'a Matrix<f32>,
     /// 4 texels x joint modes, or no rows.
     pub vector_basis: &'a Matrix<f32>,
-    /// By texel; empty if all are 1.
+    /// By texel: area in areas of a canonical texel; empty if all are 1.
     pub areas: &'a [f32],
 }
 
@@ -233,7 +234,7 @@ impl PackedShape {
         }
     }
 
-    /// The joint mode of each of these rows; `None` for padding.
+    /// The joint modes of a range of rows; `None` for padding.
     pub(crate) fn modes_of(
         &self,
         rows: Range<usize>,
@@ -247,7 +248,7 @@ impl PackedShape {
         self.stage_bytes().iter().sum::<usize>() + self.probes.bytes() + self.vector.bytes()
     }
 
-    /// Bytes of `T_d->b` and of the joint basis.
+    /// Bytes of `T_d->b`, and of the joint basis.
     pub fn stage_bytes(&self) -> [usize; 2] {
         [
             self.from_direct.bytes() + size_of_val(self.groups.as_slice()),
@@ -255,7 +256,7 @@ impl PackedShape {
         ]
     }
 
-    /// Multiply-adds of `T_d->b` and of the joint basis for one block, three channels, without padding.
+    /// Multiply-adds of `T_d->b`, and of the joint basis, for one block and three channels, without padding.
     pub fn multiply_adds(&self) -> [usize; 2] {
         let orbits = self.folding.multiplicity.iter().filter(|&&m| m > 0.0);
         let orbits = orbits.count();
@@ -263,12 +264,12 @@ impl PackedShape {
     }
 }
 
-/// Which row each joint mode has.
+/// The order of rows: classes of joint modes, in tiles.
 struct RowOrder {
     row_of_mode: Vec<u16>,
-    /// `u16::MAX` where rows are padding.
+    /// `u16::MAX` for padding.
     mode_of_row: Vec<u16>,
-    /// By class.
+    /// By class: its rows.
     classes: Vec<Range<usize>>,
     tiles: Vec<RowTile>,
 }
@@ -281,8 +282,8 @@ impl RowOrder {
             classes: vec![0..0; folding.elements()],
             tiles: Vec::new(),
         };
-        // Levels are flat more often than not: blocks on one floor share the mirror between floor and ceiling, so tiles
-        // are of modes that are even or odd under it.
+        // Most levels are flat, and blocks on one floor share the mirror that exchanges floor and ceiling. So a tile has only modes that
+        // are even under that mirror, or only odd ones.
         let is_odd = |class: usize| folding.up_mirror.is_some_and(|k| class >> k & 1 == 1);
         for odd in [false, true] {
             for class in (0..folding.elements()).filter(|&class| is_odd(class) == odd) {
@@ -309,7 +310,7 @@ impl RowOrder {
         order
     }
 
-    /// Scales of modes by row, 1 where rows are padding; none for numbers that need none.
+    /// Scales by row, 1 for padding; empty for `f32`, which has no scales.
     fn scales_by_row(&self, scales: &[f32], storage: Storage) -> Vec<f32> {
         if storage == Storage::F32 {
             return Vec::new();
@@ -320,7 +321,7 @@ impl RowOrder {
 }
 
 impl RowTile {
-    /// Its rows.
+    /// The rows of the tile.
     pub(crate) fn rows(&self) -> Range<usize> {
         usize::from(self.start)..self.end()
     }
@@ -330,7 +331,7 @@ impl RowTile {
     }
 }
 
-/// Scale of each column.
+/// Scale of each column of a matrix.
 fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
     (0..matrix.columns())
         .map(|j| {
@@ -340,7 +341,7 @@ fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
         .collect()
 }
 
-/// The largest power of two that is not above a number; 1 for what is no light.
+/// The largest power of two that is not above a number; 1 for numbers so small that no light is left of them.
 fn power_of_two(x: f32) -> f32 {
     if x < 1e-30 {
         return 1.0;
@@ -351,6 +352,7 @@ fn power_of_two(x: f32) -> f32 {
 /// SH coefficients of a probe.
 const SH_COEFFICIENTS: usize = PROBE_COEFFICIENTS;
 
+/// Packs `T_d->b`, and the list of its groups.
 fn coefficient_rows(
     folding: &Folding,
     classes: &Classes,

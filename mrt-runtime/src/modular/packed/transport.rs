@@ -1,4 +1,4 @@
-//! `T_b->r` by where light arrives, without what is zero or negligible.
+//! `T_b->r`, sorted by the block where light arrives, without columns that are zero or negligible.
 
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::PackedShape;
@@ -8,60 +8,59 @@ use mrt_core::simd::tiles::ColumnLists;
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
-/// From the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are counted as frames keep them
-/// ([`TexelLayout`]).
+/// The operator from the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are in the order of
+/// [`TexelLayout`].
 #[derive(Clone, Debug, Default)]
 pub struct PackedTransport {
-    /// By block: its tiles.
+    /// By rank: the tiles of the block.
     pub(crate) tiles_of_block: Vec<Range<u32>>,
     pub(crate) tiles: Vec<TransportTile>,
     pub(crate) entries: Vec<TransportEntry>,
-    /// Where coefficients stand among those of all blocks.
+    /// Columns of entries: positions of coefficients among those of all blocks.
     pub(crate) columns: ColumnLists,
-    /// One a column, for `int8` only.
+    /// Scale of each column, for `int8` only.
     pub(crate) column_scales: Vec<f32>,
     pub(crate) values: Option<PackedNumbers>,
-    /// By gate: the doors whose values multiply what passes it.
+    /// By gate: the doors whose values multiply light that passes it.
     pub(crate) gates: Vec<Vec<u32>>,
-    /// Blocks that a block sends light to, itself not counted unless it does: those of block k are
-    /// `reached[reached_by[k]..reached_by[k + 1]]`.
+    /// The block of rank k sends light to the blocks `reached[reached_by[k]..reached_by[k + 1]]`.
     pub(crate) reached_by: Vec<u32>,
     pub(crate) reached: Vec<BlockRank>,
     dense_multiply_adds: usize,
     multiply_adds: usize,
 }
 
-/// What arrives in one [`RowTile`](crate::modular::packed::shape::RowTile) of a block.
+/// Light that arrives in one [`RowTile`](crate::modular::packed::shape::RowTile) of a block.
 #[derive(Clone, Debug)]
 pub struct TransportTile {
     pub(crate) entries: Range<u32>,
-    /// How many of them pass gates; those come first.
+    /// Number of entries that pass a gate; they come first.
     pub(crate) gated: u32,
-    /// What sums are multiplied by.
+    /// Scale that multiplies sums.
     pub(crate) scale: f32,
-    /// Rows.
+    /// Number of rows.
     height: u8,
 }
 
-/// What one block sends to a tile.
+/// Light that one block sends to a tile.
 #[derive(Clone, Debug)]
 pub struct TransportEntry {
     pub(crate) source: BlockRank,
-    /// Which of the gates it passes; `u32::MAX` if none.
+    /// The gate that it passes; [`NO_GATE`] if none.
     pub(crate) gate: u32,
-    /// In the lists of columns.
+    /// Range in [`PackedTransport::columns`].
     pub(crate) columns: Range<u32>,
-    /// First number.
+    /// Index of its first number in [`PackedTransport::values`].
     pub(crate) start: u32,
 }
 
-/// Makes a [`PackedTransport`], one pair of blocks after another.
+/// Builds a [`PackedTransport`] from operators of pairs of blocks.
 #[derive(Debug)]
 pub struct TransportPacker<'a> {
     shapes: &'a [PackedShape],
-    /// By block, as frames count them: its shape.
+    /// By rank: the shape of the block.
     shape_of_block: Vec<usize>,
-    /// From a block's coefficients to the next one's.
+    /// Distance between the coefficients of a block and those of the next.
     block_stride: u32,
     storage: Storage,
     negligible: Option<f32>,
@@ -104,15 +103,16 @@ impl<'a> TransportPacker<'a> {
         }
     }
 
-    /// Bytes of what was added.
+    /// Bytes of all operators added so far.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.values.as_slice()) + size_of_val(self.columns.as_slice())
     }
 
-    /// Adds what `source` sends to `target` through these doors, joint modes x modes. No pair twice with the same doors.
+    /// Adds the operator, joint modes x modes, of light from `source` to `target` that passes `doors`. Call it at most once for each pair
+    /// and set of doors.
     ///
-    /// Columns of tiles are left out from the least on, up to a share `negligible` of the pair's light in L2, measured by
-    /// the light on the receiving walls of unit light on the sending ones.
+    /// The weakest columns of tiles are left out, up to a share `negligible` of the pair's light in L2. A column's light is the light on
+    /// the receiving walls from unit light on the sending walls.
     pub(crate) fn add(
         &mut self,
         doors: &[u32],
@@ -352,16 +352,16 @@ fn largest<'n>(numbers: impl IntoIterator<Item = &'n f32>) -> f32 {
 /// [`TransportEntry::gate`] of light that passes no gate.
 const NO_GATE: u32 = u32::MAX;
 
-/// What may be left out of the light of so many modes, if nothing else is asked for.
+/// Default share of light that may be left out, for a block with `modes` modes.
 fn negligible(modes: usize) -> f32 {
     (0.02 * (32.0 / modes as f32).powi(2)).clamp(0.02, 0.15)
 }
 
-/// Share of a pair's light that is rounding: what mirrors make zero is this small.
+/// Share of a pair's light that is always left out: rounding leaves this much where symmetry would give zero.
 const ROUNDING: f64 = 1e-6;
 
 impl PackedTransport {
-    /// Bytes of operators and of what says where they stand.
+    /// Bytes of numbers and of their lists.
     pub fn bytes(&self) -> usize {
         self.values.as_ref().map_or(0, PackedNumbers::bytes)
             + self.columns.bytes()
@@ -372,13 +372,13 @@ impl PackedTransport {
             + size_of_val(self.reached.as_slice())
     }
 
-    /// Multiply-adds of one product, three channels: of what is kept, with padding, and of dense operators of all pairs.
+    /// Multiply-adds of one product of three channels: with the columns that are kept, padding included; and with dense operators of all
+    /// pairs.
     pub fn multiply_adds(&self) -> [usize; 2] {
         [self.multiply_adds, self.dense_multiply_adds]
     }
 
-    /// The same of what is kept, where only some blocks have light: `is_lit[rank]`, ranks as in
-    /// [`TexelLayout::rank`].
+    /// Multiply-adds of one product of three channels with the columns that are kept, if only blocks with `is_lit[rank]` have light.
     ///
     /// # Panics
     /// If there are fewer flags than blocks.
@@ -392,7 +392,7 @@ impl PackedTransport {
         self.tiles.iter().map(of_tile).sum()
     }
 
-    /// Blocks that a block sends light to.
+    /// The blocks that a block sends light to.
     pub(crate) fn reached(&self, block: BlockRank) -> &[BlockRank] {
         let block = block.get();
         &self.reached[self.reached_by[block] as usize..self.reached_by[block + 1] as usize]
