@@ -11,17 +11,28 @@ use mrt_runtime::{AssembleConfig, Dictionary, Frame, FrameConfig, Level, Light, 
 use std::error::Error;
 use std::path::Path;
 
-/// Where the torch is, x and z in metres. The fourth place is inside a wall: players clip, animations overshoot.
-const WALK: [[f32; 2]; 6] = [
-    [0.6, 0.5],
-    [1.5, 0.5],
-    [2.4, 0.5],
-    [3.4, 0.5],
-    [2.5, 1.5],
-    [2.5, 2.5],
+/// A floor plan: `#` is a cell of the level.
+const PLAN: [&str; 7] = [
+    "#######.###",
+    "#.....#.#.#",
+    "#.###.###.#",
+    "#.#.#...#.#",
+    "#.#.#####.#",
+    "#.#.......#",
+    "###.#######",
 ];
 
-/// Frames between two of these places.
+/// Where the torch is, x and z in metres. The fourth place is inside a wall: players clip, animations overshoot.
+const WALK: [[f32; 2]; 6] = [
+    [1.5, 0.5],
+    [4.0, 0.5],
+    [6.4, 0.5],
+    [7.4, 0.5],
+    [6.5, 2.3],
+    [8.5, 2.6],
+];
+
+/// Frames at each of these places.
 const FRAMES: usize = 8;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,7 +42,17 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Writes one picture of the six places.
 pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     let dictionary = Dictionary::from_bytes(include_bytes!("../../assets/cubes-2d-standard.mrt"))?;
-    let level = Level::from_text(include_str!("../../assets/maze.level.toml"))?;
+    let rows = (0..).zip(PLAN);
+    let cells = rows.flat_map(|(z, row)| {
+        (0..)
+            .zip(row.bytes())
+            .map(move |(x, cell)| ([x, 0, z], cell))
+    });
+    let cells: Vec<_> = cells
+        .filter(|(_, cell)| *cell == b'#')
+        .map(|(at, _)| at)
+        .collect();
+    let level = Level::from_cells(&cells, vec3(0.72, 0.66, 0.58))?;
     let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let config = FrameConfig {
         // Light that changes by less than this, W/m², stays as it is: a thousandth of the brightest shows nowhere. Far from
@@ -41,7 +62,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     };
     let mut frame = Frame::new(&scene, config);
     // A lamp that stays, and a torch. Ids stay valid whatever is added or removed later.
-    frame.add_light(Light::sphere(vec3(4.5, 0.6, 3.5), 0.1, vec3(0.6, 0.9, 1.6)));
+    frame.add_light(Light::sphere(vec3(4.5, 0.6, 6.5), 0.1, vec3(0.6, 0.9, 1.6)));
     let torch = frame.add_light(torch_at(WALK[0]));
     let lightmap = frame.lightmap();
     let whole = lightmap.width() * lightmap.height() * size_of::<[u16; 4]>();
@@ -62,9 +83,10 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             }
         }
         println!(
-            "torch at {place:?}: {tiles} tiles, {} KiB in {FRAMES} frames; whole lightmaps would be {} KiB",
-            bytes / 1024,
-            FRAMES * whole / 1024
+            "torch at {place:?}: {} tiles, {} KiB a frame; the whole lightmap has {} KiB",
+            tiles / FRAMES,
+            bytes / FRAMES / 1024,
+            whole / 1024
         );
         // A light that cannot shine does not stop the others. Its id says which one it was.
         for skipped in frame.last_report().skipped_lights() {
@@ -72,7 +94,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             println!("  skipped {skipped}");
         }
         let marker = view::torch(vec3(place[0], 0.6, place[1]));
-        let camera = Camera::above([5.0, 4.0], [420, 300]);
+        let camera = Camera::above([11.0, 7.0], [460, 290]);
         let shown = Shown::DirectAndIndirect;
         pictures.push(view::draw(&level, &frame, camera, shown, marker));
     }

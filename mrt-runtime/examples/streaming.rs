@@ -20,6 +20,9 @@ const BEFORE: [[i32; 2]; 5] = [[0, 0], [1, 0], [2, 0], [3, 0], [3, 1]];
 /// Cells in memory later: two are gone, four are new, and those kept stand at other places in the list.
 const AFTER: [[i32; 2]; 7] = [[5, 1], [4, 1], [3, 1], [3, 0], [2, 0], [3, 2], [4, 2]];
 
+/// Cells that are in both.
+const KEPT: [[i32; 2]; 3] = [[2, 0], [3, 0], [3, 1]];
+
 fn main() -> Result<(), Box<dyn Error>> {
     run(&common::folder())
 }
@@ -35,10 +38,17 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     for _ in 0..12 {
         frame.solve();
     }
-    // Where a cell stands in a list. Cell (3, 1) is a dead end before, and a junction after.
-    let block = |cells: &[[i32; 2]], cell| cells.iter().position(|c| *c == cell);
-    let kept = |cells: &[[i32; 2]]| BlockIndex::new(block(cells, [3, 1]).unwrap_or(0));
-    let light_before = common::mean_indirect(&frame, kept(&BEFORE));
+    // Where a cell stands in a list, and the light there. Cell (2, 0) loses an opening, and (3, 1) gains two.
+    let block =
+        |cells: &[[i32; 2]], cell| cells.iter().position(|c| *c == cell).map(BlockIndex::new);
+    let light = |frame: &Frame, cells: &[[i32; 2]]| {
+        let blocks = KEPT.map(|cell| block(cells, cell));
+        blocks.map(|at| at.map_or(0.0, |block| common::mean_indirect(frame, block)))
+    };
+    println!(
+        "indirect light of kept cells, W/m²: {:.2?} before",
+        light(&frame, &BEFORE)
+    );
     let camera = Camera::above([6.0, 3.0], [420, 260]);
     let torch_ball = view::torch(position);
     let draw = |level: &Level, frame: &Frame| {
@@ -68,27 +78,21 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
 
     // For each block of the new scene: which block of the old one it was. Light goes on from there, on all walls that are
     // still there; new blocks are dark.
-    frame.change_scene(&scene, |new| {
-        block(&BEFORE, AFTER[new.get()]).map(BlockIndex::new)
-    });
+    frame.change_scene(&scene, |new| block(&BEFORE, AFTER[new.get()]));
     // The lightmap has another size now: make a new texture, cleared to black, and upload all that changes.
     let report = frame.solve();
     println!(
-        "indirect light of a kept block: {:.4} W/m² before, {:.4} in the first frame of the new scene",
-        light_before,
-        common::mean_indirect(&frame, kept(&AFTER))
+        "{:.2?} in the first frame of the new scene, {} tiles to upload",
+        light(&frame, &AFTER),
+        report.changed_tiles().len()
     );
-    println!("tiles to upload: {}", report.changed_tiles().len());
     // Ids of lights are what they were.
     assert!(frame.light(torch).is_some() && report.skipped_lights().is_empty());
     pictures.push(draw(&level, &frame));
     for _ in 0..12 {
         frame.solve();
     }
-    println!(
-        "indirect light of a new block: {:.4} W/m²",
-        common::mean_indirect(&frame, BlockIndex::new(1))
-    );
+    println!("{:.2?} when all has settled", light(&frame, &AFTER));
     pictures.push(draw(&level, &frame));
     Picture::sheet(&pictures, 3).write(out, "streaming.png", 0.9)
 }
