@@ -11,7 +11,7 @@ use mrt_runtime::{AssembleConfig, Dictionary, Frame, FrameConfig, Level, Light, 
 use std::error::Error;
 use std::path::Path;
 
-/// A floor plan: `#` is a cell of the level.
+/// A floor plan: one cell of the level for each `#`.
 const PLAN: [&str; 7] = [
     "#######.###",
     "#.....#.#.#",
@@ -32,9 +32,6 @@ const WALK: [[f32; 2]; 6] = [
     [8.5, 2.6],
 ];
 
-/// Frames at each of these places.
-const FRAMES: usize = 8;
-
 fn main() -> Result<(), Box<dyn Error>> {
     run(&common::folder())
 }
@@ -42,33 +39,23 @@ fn main() -> Result<(), Box<dyn Error>> {
 /// Writes one picture of the six places.
 pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
     let dictionary = Dictionary::from_bytes(include_bytes!("../../assets/cubes-2d-standard.mrt"))?;
-    let rows = (0..).zip(PLAN);
-    let cells = rows.flat_map(|(z, row)| {
-        (0..)
-            .zip(row.bytes())
-            .map(move |(x, cell)| ([x, 0, z], cell))
-    });
-    let cells: Vec<_> = cells
-        .filter(|(_, cell)| *cell == b'#')
-        .map(|(at, _)| at)
-        .collect();
-    let level = Level::from_cells(&cells, vec3(0.72, 0.66, 0.58))?;
+    let level = Level::from_cells(&common::cells(&PLAN), vec3(0.72, 0.66, 0.58))?;
     let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
     let config = FrameConfig {
-        // Light that changes by less than this, W/m², stays as it is: a thousandth of the brightest shows nowhere. Far from
-        // the torch nothing is computed or uploaded then, and nothing anywhere once it rests.
-        tolerance: 0.02,
+        // Light that changes by less than this, W/m², stays as it is: no game shows it. Far from the torch nothing is computed
+        // or uploaded then, and nothing anywhere once it rests.
+        tolerance: 0.004,
         ..FrameConfig::default()
     };
     let mut frame = Frame::new(&scene, config);
     // A lamp that stays, and a torch. Ids stay valid whatever is added or removed later.
     frame.add_light(Light::sphere(vec3(4.5, 0.6, 6.5), 0.1, vec3(0.6, 0.9, 1.6)));
     let torch = frame.add_light(torch_at(WALK[0]));
-    let lightmap = frame.lightmap();
-    let whole = lightmap.width() * lightmap.height() * size_of::<[u16; 4]>();
+    let whole = 8 * frame.lightmap().pixels().len();
     // Memory that each upload uses again.
     let mut staging = Vec::new();
     let mut pictures = Vec::new();
+    const FRAMES: usize = 8;
     for place in WALK {
         frame.set_light(torch, torch_at(place));
         let (mut tiles, mut bytes) = (0, 0);
@@ -88,7 +75,7 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
             bytes / FRAMES / 1024,
             whole / 1024
         );
-        // A light that cannot shine does not stop the others. Its id says which one it was.
+        // A light that cannot shine stops no other. Its id says which one it was.
         for skipped in frame.last_report().skipped_lights() {
             assert_eq!(skipped.id, torch);
             println!("  skipped {skipped}");
@@ -98,11 +85,11 @@ pub fn run(out: &Path) -> Result<(), Box<dyn Error>> {
         let shown = Shown::DirectAndIndirect;
         pictures.push(view::draw(&level, &frame, camera, shown, marker));
     }
-    let mut frames = 1;
+    let mut uploads = 0;
     while frame.solve().changed_tiles().len() > 0 {
-        frames += 1;
+        uploads += 1;
     }
-    println!("the torch rests: nothing is left to upload after {frames} frames");
+    println!("the torch rests: {uploads} more frames have something to upload, then none");
     Picture::sheet(&pictures, 3).write(out, "moving_light.png", 1.5)
 }
 
