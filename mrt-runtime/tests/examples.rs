@@ -1,7 +1,7 @@
 //! Every example runs, and the pictures that it writes show something.
 
-// Examples have a `main`, which nobody calls here.
-#![allow(dead_code)]
+// Examples have a `main`, which nobody calls here, and each brings the module `common`.
+#![allow(dead_code, clippy::duplicate_mod)]
 
 use std::error::Error;
 use std::fs;

@@ -16,6 +16,16 @@ pub fn folder() -> PathBuf {
     argument.map_or_else(|| "mrt-examples".into(), PathBuf::from)
 }
 
+/// Cells of a floor plan, x to the right and z down: one for each `#`.
+pub fn cells(plan: &[&str]) -> Vec<[i32; 3]> {
+    let rows = (0..).zip(plan);
+    let cells = rows.flat_map(|(z, row)| (0..).zip(row.bytes()).map(move |(x, c)| (c, [x, 0, z])));
+    cells
+        .filter(|(c, _)| *c == b'#')
+        .map(|(_, cell)| cell)
+        .collect()
+}
+
 /// Mean indirect irradiance over the walls of a block, all channels together, W/m².
 pub fn mean_indirect(frame: &Frame, block: BlockIndex) -> f32 {
     let texels = (0..).map_while(|texel| frame.indirect_at(block, texel));
