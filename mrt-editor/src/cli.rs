@@ -1,9 +1,11 @@
-//! The command line: one module a command, with its flags and what it does, and what commands share.
+//! The command line: one module a command, with its flags and what it does, below what commands share.
 
 pub mod output;
 pub mod table;
+pub mod progress;
 pub mod dictionary_source;
-pub mod reference_level;
+pub mod dictionary_report;
+pub mod import_args;
 pub mod accuracy;
 pub mod adapt;
 pub mod bake;

@@ -1,25 +1,30 @@
 //! Maps a real scene to a level of blocks (Loos et al. 2011, sections 6.2 and 7.2).
 //!
-//! The paper's artists place blocks by hand; here blocks are found: one closed box around everything, or
-//! the free space cut along a grid. Only what lies inside rooms becomes blocks, so light that the
-//! level carries cannot leak through walls that were cut along.
+//! The paper's artists place blocks by hand; here blocks are found: one closed box around everything, or the free space cut
+//! along a grid. Only what lies inside rooms becomes blocks, so light that the level carries cannot leak through walls that
+//! a grid line follows.
 
-pub mod box_fit;
-pub mod cells;
-pub mod columns;
-pub mod grid_fit;
-pub mod grid_lines;
-pub mod paint;
-pub mod surface;
+pub mod config;
 pub mod voxels;
+pub mod column_runs;
+pub mod cell;
+mod storeys;
+pub mod cut;
+pub mod grid_lines;
+pub mod grid_fit;
+pub mod box_fit;
+pub mod mesh_samples;
+pub mod paint;
 
-use columns::Columns;
-use glam::Vec3;
-use grid_fit::JoinConfig;
+use column_runs::ColumnRuns;
+use config::{Fit, MapConfig, MapError};
+use glam::{DVec3, Vec3};
+use grid_fit::{GridLevel, JoinConfig};
 use grid_lines::LineConfig;
 use mrt_core::geometry::mesh::{TriangleMesh, bounds};
-use mrt_runtime::blocks::Shape;
-use mrt_runtime::{Level, LevelError};
+use mrt_runtime::Level;
+use mrt_runtime::LevelError;
+use mrt_runtime::blocks::{SHAPES, Shape};
 use voxels::{FreeSpace, VoxelGrid, Winding, find_free_space};
 
 /// Points spread over the mesh to measure albedos and coverage.
@@ -34,50 +39,8 @@ const MOST_VOXELS: f64 = 6e6;
 /// Voxels across a cell.
 const VOXELS_A_CELL: f64 = 10.0;
 
-/// Rooms lower than this share of a cell are not rooms.
+/// Free space lower than this share of a cell belongs to no room.
 const LEAST_HEADROOM: f64 = 0.2;
-
-/// How blocks are laid around a mesh.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MapConfig {
-    /// One box or a grid.
-    pub fit: Fit,
-    /// Wanted width of a block, metres; by default the rooms' typical height.
-    pub cell: Option<f64>,
-    /// Most blocks to make.
-    pub max_blocks: usize,
-    /// Least share of the side between two cells that must be open to join them.
-    pub openness: f64,
-    /// Grid lines whose sides disagree by less than this share are taken out.
-    pub tolerance: f64,
-    /// Groups of joined cells below this share of the free volume are dropped.
-    pub crumb_share: f64,
-    /// Which side of the triangles faces the rooms.
-    pub winding: Winding,
-}
-
-impl Default for MapConfig {
-    fn default() -> Self {
-        Self {
-            fit: Fit::Grid,
-            cell: None,
-            max_blocks: 200,
-            openness: 0.25,
-            tolerance: 0.15,
-            crumb_share: 0.01,
-            winding: Winding::Auto,
-        }
-    }
-}
-
-/// The kind of level to make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Fit {
-    /// One closed block around everything.
-    Box,
-    /// Connected blocks that fill the free space.
-    Grid,
-}
 
 /// A level around a mesh.
 #[derive(Clone, Debug)]
@@ -86,9 +49,9 @@ pub struct Mapped {
     pub level: Level,
     /// Wanted width of a block that was used, metres; 0 for a box.
     pub cell: f64,
-    /// Cells in groups too small to matter.
+    /// Cells dropped because their group is too small to matter.
     pub crumbs: usize,
-    /// Cells too flat, folded or in one another's way.
+    /// Cells dropped because they are too flat, folded or in one another's way.
     pub misfits: usize,
     /// Passages closed because the cells on both sides could not be brought to one height.
     pub closed_passages: usize,
@@ -98,66 +61,17 @@ pub struct Mapped {
     pub coverage: paint::Coverage,
 }
 
-/// Why a mesh has no level.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum MapError {
-    /// Zero blocks asked for.
-    #[error("--max-blocks 0; expected at least 1")]
-    NoBlocks,
-
-    /// No point with a floor below and walls around.
-    #[error(
-        "the scene encloses no free space: found no point with a floor below and faces towards it on \
-         most sides; try --winding both, or --fit box for one block around everything"
-    )]
-    NoFreeSpace,
-    /// Triangles lie over one another by the thousand.
-    #[error(
-        "the scene's triangles overlap too much: found over {} crossings of voxel rows; expected a level \
-         of rooms (try a larger --cell)",
-        voxels::MOST_CROSSINGS
-    )]
-    TooDense,
-    /// The cell size is not a positive number.
-    #[error("--cell {found}; expected a positive number of metres")]
-    Cell {
-        /// The size given.
-        found: f64,
-    },
-    /// Blocks could not be told apart in the free space that is found.
-    #[error(
-        "--cell {found}; expected at least {expected:.3} m, the edge of the finest voxel for this mesh"
-    )]
-    CellTooSmall {
-        /// Smallest accepted, metres.
-        expected: f64,
-        /// The size given.
-        found: f64,
-    },
-    /// A share is not in [0, 1].
-    #[error("{flag} {found}; expected a number from 0 to 1")]
-    Share {
-        /// Which flag.
-        flag: &'static str,
-        /// The value given.
-        found: f64,
-    },
-    /// The blocks found are no level.
-    #[error(transparent)]
-    Level(#[from] LevelError),
-}
-
 /// Makes a level around a mesh.
 ///
 /// # Errors
 /// [`MapError`]; a mesh without rooms has no grid level.
 pub fn map_mesh(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapError> {
-    check(config)?;
-    let points = surface::spread_points(mesh, SURFACE_POINTS);
+    config.check()?;
+    let points = mesh_samples::sample_mesh(mesh, SURFACE_POINTS);
     let mut mapped = match config.fit {
         Fit::Box => {
             let places: Vec<Vec3> = points.iter().map(|point| point.position).collect();
-            from_level(box_fit::fit_box(closed_shape(), &places))
+            Mapped::new(box_fit::fit_box(closed_shape(), &places))
         }
         Fit::Grid => map_to_grid(mesh, config)?,
     };
@@ -166,98 +80,79 @@ pub fn map_mesh(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapEr
     Ok(mapped)
 }
 
-fn check(config: &MapConfig) -> Result<(), MapError> {
-    if let Some(found) = config
-        .cell
-        .filter(|&cell| !(cell.is_finite() && cell > 0.0))
-    {
-        return Err(MapError::Cell { found });
-    }
-    if config.max_blocks == 0 {
-        return Err(MapError::NoBlocks);
-    }
-    for (flag, found) in [
-        ("--openness", config.openness),
-        ("--tolerance", config.tolerance),
-        ("--crumbs", config.crumb_share),
-    ] {
-        if !(0.0..=1.0).contains(&found) {
-            return Err(MapError::Share { flag, found });
-        }
-    }
-    Ok(())
-}
-
 fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapError> {
-    let triangles: Vec<[Vec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
-    let [low, high] = bounds(mesh).ok_or(MapError::NoFreeSpace)?;
-    let size = (high - low).as_dvec3();
-    let voxel_edge = |voxels: f64| {
-        // Flat scenes have an area but no volume to share out.
-        let flat = size.max_element() / (voxels / 4.0).sqrt();
-        (size.element_product() / voxels).cbrt().max(flat)
-    };
-    let free_space = |edge: f64| {
-        let grid = VoxelGrid::around(low, high, edge);
-        find_free_space(&triangles, grid, config.winding).ok_or(MapError::TooDense)
-    };
-    let finest = voxel_edge(MOST_VOXELS);
-    let cell = match config.cell {
-        Some(found) if found < finest => {
-            return Err(MapError::CellTooSmall {
-                expected: finest,
-                found,
-            });
-        }
-        Some(cell) => cell,
-        None => {
-            let first = free_space(voxel_edge(FIRST_VOXELS))?;
-            usual_cell(&first, config.max_blocks).ok_or(MapError::NoFreeSpace)?
-        }
-    };
-    let edge = (cell / VOXELS_A_CELL).max(finest);
-    let space: FreeSpace = free_space(edge)?;
-    let columns = Columns::new(&space, LEAST_HEADROOM * cell);
-    if columns.runs.is_empty() {
-        return Err(MapError::NoFreeSpace);
-    }
-    let lines = grid_lines::choose_lines(
-        &space,
-        &columns,
-        &LineConfig {
-            cell,
-            max_cells: config.max_blocks,
-            tolerance: config.tolerance,
-        },
-    );
-    let cells = cells::cut_into_cells(&space, &columns, &lines);
-    let joined = grid_fit::join_cells(
-        &space,
-        &lines,
-        &cells,
-        &JoinConfig {
-            openness: config.openness,
-            crumb_share: config.crumb_share,
-        },
-    )
-    .map_err(|error| match error {
-        LevelError::Empty => MapError::NoFreeSpace,
-        error => MapError::Level(error),
-    })?;
+    let voxelizer = Voxelizer::new(mesh, config.winding)?;
+    let cell = cell_width(&voxelizer, config)?;
+    let space = voxelizer.free_space((cell / VOXELS_A_CELL).max(voxelizer.finest()))?;
+    let joined = cut_and_join(&space, cell, config)?;
     Ok(Mapped {
         cell,
         crumbs: joined.crumbs,
         misfits: joined.misfits,
         closed_passages: joined.closed_passages,
         is_reversed: space.is_reversed,
-        ..from_level(joined.level)
+        ..Mapped::new(joined.level)
     })
 }
 
-/// The rooms' typical height, which makes cubes; less in levels that are not all rooms of one size, as
-/// far as half the blocks allow.
+/// A mesh whose free space is looked for.
+struct Voxelizer {
+    triangles: Vec<[Vec3; 3]>,
+    low: Vec3,
+    high: Vec3,
+    winding: Winding,
+}
+
+impl Voxelizer {
+    fn new(mesh: &TriangleMesh, winding: Winding) -> Result<Self, MapError> {
+        let triangles = (0..mesh.triangles.len()).map(|t| mesh.corners(t));
+        let [low, high] = bounds(mesh).ok_or(MapError::NoFreeSpace)?;
+        Ok(Self {
+            triangles: triangles.collect(),
+            low,
+            high,
+            winding,
+        })
+    }
+
+    /// Edge of a voxel, metres, of which about `count` fill the mesh's bounds.
+    fn edge(&self, count: f64) -> f64 {
+        let size: DVec3 = (self.high - self.low).as_dvec3();
+        // Flat scenes have an area but no volume to share out.
+        let flat = size.max_element() / (count / 4.0).sqrt();
+        (size.element_product() / count).cbrt().max(flat)
+    }
+
+    /// Edge of the smallest voxel that is made, metres.
+    fn finest(&self) -> f64 {
+        self.edge(MOST_VOXELS)
+    }
+
+    fn free_space(&self, edge: f64) -> Result<FreeSpace, MapError> {
+        let grid = VoxelGrid::around(self.low, self.high, edge);
+        find_free_space(&self.triangles, grid, self.winding).ok_or(MapError::TooDense)
+    }
+}
+
+/// The width asked for, or one that suits the rooms, metres.
+fn cell_width(voxelizer: &Voxelizer, config: &MapConfig) -> Result<f64, MapError> {
+    match config.cell {
+        Some(found) if found < voxelizer.finest() => Err(MapError::CellTooSmall {
+            expected: voxelizer.finest(),
+            found,
+        }),
+        Some(cell) => Ok(cell),
+        None => {
+            let space = voxelizer.free_space(voxelizer.edge(FIRST_VOXELS))?;
+            usual_cell(&space, config.max_blocks).ok_or(MapError::NoFreeSpace)
+        }
+    }
+}
+
+/// The rooms' typical height, which makes cubes. In levels of rooms of several sizes less, as far as half of the blocks
+/// allow. `None` without free space.
 fn usual_cell(space: &FreeSpace, max_blocks: usize) -> Option<f64> {
-    let height = Columns::new(space, 0.0).typical_height()?;
+    let height = ColumnRuns::new(space, 0.0).typical_height()?;
     let volume = space.free_count() as f64 * space.grid.edge.powi(3);
     let is_one_room = volume < 8.0 * height.powi(3);
     if is_one_room {
@@ -267,20 +162,46 @@ fn usual_cell(space: &FreeSpace, max_blocks: usize) -> Option<f64> {
     Some(affordable.clamp(0.6 * height, height))
 }
 
-fn from_level(level: Level) -> Mapped {
-    Mapped {
-        level,
-        cell: 0.0,
-        crumbs: 0,
-        misfits: 0,
-        closed_passages: 0,
-        is_reversed: false,
-        coverage: paint::Coverage::default(),
+/// Cuts the free space along grid lines and joins what becomes of it.
+fn cut_and_join(space: &FreeSpace, cell: f64, config: &MapConfig) -> Result<GridLevel, MapError> {
+    let columns = ColumnRuns::new(space, LEAST_HEADROOM * cell);
+    if columns.runs.is_empty() {
+        return Err(MapError::NoFreeSpace);
+    }
+    let line_config = LineConfig {
+        cell,
+        max_cells: config.max_blocks,
+        tolerance: config.tolerance,
+    };
+    let lines = grid_lines::choose_lines(space, &columns, &line_config);
+    let cells = cut::cut_into_cells(space, &columns, &lines);
+    let join_config = JoinConfig {
+        openness: config.openness,
+        crumb_share: config.crumb_share,
+    };
+    grid_fit::join_cells(space, &lines, &cells, &join_config).map_err(|error| match error {
+        LevelError::Empty => MapError::NoFreeSpace,
+        error => MapError::Level(error),
+    })
+}
+
+impl Mapped {
+    /// A level of which nothing was left out; its coverage is not known yet.
+    fn new(level: Level) -> Self {
+        Self {
+            level,
+            cell: 0.0,
+            crumbs: 0,
+            misfits: 0,
+            closed_passages: 0,
+            is_reversed: false,
+            coverage: paint::Coverage::default(),
+        }
     }
 }
 
 fn closed_shape() -> &'static Shape {
-    &mrt_runtime::blocks::SHAPES[0]
+    &SHAPES[0]
 }
 
 #[cfg(test)]

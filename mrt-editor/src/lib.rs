@@ -1,9 +1,9 @@
-//! The `mrt` tool's parts, in the order in which data flows: a dictionary is found or baked, a mesh is
-//! read, mapped to blocks, lit through them, looked at and compared with references.
+//! The `mrt` tool's parts, in the order in which data flows: a mesh is read, a level is laid around it, kept as a
+//! document, lit and looked at, and compared with references; the command line calls them all.
 
 pub mod import;
-pub mod receiver;
 pub mod fit_level;
 pub mod document;
 pub mod render;
+pub mod accuracy;
 pub mod cli;

@@ -4,43 +4,22 @@ pub mod camera;
 pub mod file;
 pub mod level_view;
 pub mod lit;
+pub mod picture;
 pub mod placement;
 pub mod tone;
 
 use camera::Camera;
 use glam::Vec3;
+use picture::Picture;
 use rayon::prelude::*;
 
-/// Linear RGB pixels, row by row from the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Picture {
-    /// Pixels a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Colours.
-    pub pixels: Vec<Vec3>,
-}
-
-impl Picture {
-    /// A black picture.
-    pub fn new(width: usize, height: usize) -> Self {
-        Self {
-            width,
-            height,
-            pixels: vec![Vec3::ZERO; width * height],
-        }
-    }
-}
-
-/// Pixels that differ from a neighbour by more than this share are taken again with more rays.
+/// Pixels that differ from a neighbour by more than this share are rendered again with more rays.
 const EDGE_CONTRAST: f32 = 0.04;
 
-/// Renders `N` pictures of one view: `colours` gives all of them for a ray. Every pixel gets one ray, and
-/// those at edges the mean over `samples`² rays.
+/// Renders `N` pictures of one view. `colours` gives the colours of all pictures along a ray, from its origin and unit
+/// direction. Every pixel gets one ray, and pixels at edges the mean over `samples`² rays.
 ///
-/// Cost: one call of `colours` a ray, spread over the threads; the result does not depend on their
-/// number.
+/// Cost: one call of `colours` a ray, spread over the threads; the result does not depend on their number.
 pub fn render<const N: usize>(
     camera: &Camera,
     [width, height]: [usize; 2],
@@ -107,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn edges_are_smoothed_and_flat_places_are_not_touched() {
+    fn only_edges_are_smoothed() {
         let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, 1.0, 1.0).expect("looks");
         let half = |_: Vec3, direction: Vec3| {
             let is_lit = direction.x + 0.3 * direction.y > 0.01;

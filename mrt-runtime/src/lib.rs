@@ -70,3 +70,8 @@ pub use output::lightmap::Lightmap;
 pub use output::lightmap_atlas::Tile;
 pub use output::probe_order::ProbeOrder;
 pub use output::probes::Probes;
+
+/// Tests the example of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

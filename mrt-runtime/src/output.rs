@@ -5,4 +5,5 @@ pub mod lightmap_atlas;
 pub mod lightmap;
 pub mod probe_order;
 pub mod probes;
+pub mod receiver;
 mod pixel_formats;

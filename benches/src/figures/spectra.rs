@@ -5,6 +5,7 @@ use super::{FigureError, Setting};
 use crate::canvas::{Area, Canvas, Colour, Lettering, PAPER, SERIES, Side};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_dictionary::modular::paths::emission::{emission_basis, emitter_radiosity};
+use mrt_dictionary::modular::paths::ends::PathFrame;
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};
 use mrt_dictionary::progress::Progress;
 
@@ -122,7 +123,8 @@ fn emission(setting: &Setting) -> Option<Spectrum> {
                 .openings
                 .iter()
                 .map(move |opening| {
-                    emitter_radiosity(shape, opening.face, false, &radiosity, resolution)
+                    let (face, frame) = (opening.face, PathFrame::Upright);
+                    emitter_radiosity(shape, face, frame, &radiosity, resolution)
                 })
                 .collect::<Vec<_>>()
         })

@@ -253,7 +253,7 @@ fn triangle_factor(apex: &Corner, from: &Corner, to: &Corner) -> (f64, f64) {
     (real, imaginary)
 }
 
-/// Moments with the sign of the winding, by Radon's rule: seven points a triangle, exact for polynomials
+/// Moments with the sign of the winding, by Radon's rule: seven points per triangle, exact for polynomials
 /// of degree five.
 fn quadrature(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
     let root = 15f64.sqrt();

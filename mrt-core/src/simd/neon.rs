@@ -1,4 +1,4 @@
-//! NEON.
+//! The lanes of NEON.
 
 #![allow(
     unsafe_code,

@@ -170,7 +170,7 @@ impl Kernel for Dot<'_> {
     }
 }
 
-/// Numbers in [-1, 1), the same everywhere.
+/// Fixed numbers in [-1, 1).
 fn numbers(count: usize) -> Vec<f32> {
     (0..count)
         .map(|k| ((k * 7919 + 13) % 2048) as f32 / 1024.0 - 1.0)

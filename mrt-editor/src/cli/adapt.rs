@@ -1,7 +1,8 @@
 //! `mrt adapt`: gives warped blocks operators of their own.
 
-use crate::cli::dictionary_source::{SourceError, load, with_progress};
-use crate::cli::output::is_same_place;
+use crate::cli::dictionary_source::{SourceError, load};
+use crate::cli::output::{ReportError, is_same_place, print_report};
+use crate::cli::progress::with_progress;
 use crate::cli::table::Table;
 use crate::document::level_file::{LevelFileError, read_level, write_level};
 use mrt_core::container::{ContainerError, write_file_atomically};
@@ -73,7 +74,7 @@ pub enum AdaptError {
     /// The dictionary cannot be adapted, or the user stopped it.
     #[error("{0}; no file was written")]
     Variants(#[from] VariantError),
-    /// A threshold is no error.
+    /// A threshold is negative or not a number.
     #[error("--{name} {found}; expected 0 or more")]
     Threshold {
         /// Which flag.
@@ -81,7 +82,7 @@ pub enum AdaptError {
         /// The value given.
         found: f64,
     },
-    /// Both outputs are one file, or there is no place for one.
+    /// Two of the files are one: both outputs, or the dictionary and the level that is read.
     #[error("{}: expected two files, one for a level and one for the dictionary", path.display())]
     SameFile {
         /// The file.
@@ -91,11 +92,11 @@ pub enum AdaptError {
     #[error(transparent)]
     Write(#[from] ContainerError),
     /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Report {
     blocks: Vec<BlockReport>,
     variants: usize,
@@ -136,35 +137,43 @@ pub fn run(args: &AdaptArgs) -> Result<(), AdaptError> {
         estimate_blocks(&level, &dictionary, progress)
     })?;
     let adapted = adapted(&level, &estimates, args);
-    let mut report = Report {
-        blocks: block_reports(&level, &adapted, &estimates),
-        variants: 0,
-        variant_bytes: 0,
-        level: None,
-        dictionary: None,
-    };
-    if let (Some(out_level), Some(out_dictionary), false) =
-        (&args.out_level, &args.out_dictionary, args.report)
-    {
-        let made = with_progress("adapting", |progress| {
-            make_variants(&adapted, &dictionary, &VariantConfig::default(), progress)
-        })?;
-        report.variants = made.len();
-        report.variant_bytes = made.iter().map(|variant| variant.operators.bytes()).sum();
-        add_variants(&mut dictionary, made);
-        let bytes = dictionary.to_bytes()?;
-        // A dictionary with more than a level needs does no harm, so it comes first.
-        write_file_atomically(out_dictionary, &bytes)?;
-        write_level(out_level, &adapted)?;
-        report.level = Some(out_level.display().to_string());
-        report.dictionary = Some(out_dictionary.display().to_string());
-    }
-    if args.json {
-        crate::report_line!("{}", serde_json::to_string(&report)?);
+    let written = if args.report {
+        None
     } else {
-        print(&report);
-    }
-    Ok(())
+        write_adapted(args, &adapted, &mut dictionary)?
+    };
+    let report = Report {
+        blocks: block_reports(&level, &adapted, &estimates),
+        ..written.unwrap_or_default()
+    };
+    Ok(print_report(&report, args.json, print)?)
+}
+
+/// Computes the operators, writes both files and reports them; `None` without places to write to.
+fn write_adapted(
+    args: &AdaptArgs,
+    adapted: &Level,
+    dictionary: &mut Dictionary,
+) -> Result<Option<Report>, AdaptError> {
+    let (Some(out_level), Some(out_dictionary)) = (&args.out_level, &args.out_dictionary) else {
+        return Ok(None);
+    };
+    let made = with_progress("adapting", |progress| {
+        make_variants(adapted, dictionary, &VariantConfig::default(), progress)
+    })?;
+    let report = Report {
+        blocks: Vec::new(),
+        variants: made.len(),
+        variant_bytes: made.iter().map(|variant| variant.operators.bytes()).sum(),
+        level: Some(out_level.display().to_string()),
+        dictionary: Some(out_dictionary.display().to_string()),
+    };
+    add_variants(dictionary, made);
+    let bytes = dictionary.to_bytes()?;
+    // The dictionary comes first: one with more than a level needs does no harm.
+    write_file_atomically(out_dictionary, &bytes)?;
+    write_level(out_level, adapted)?;
+    Ok(Some(report))
 }
 
 fn check(args: &AdaptArgs) -> Result<(), AdaptError> {
@@ -195,7 +204,8 @@ fn check(args: &AdaptArgs) -> Result<(), AdaptError> {
     Ok(())
 }
 
-/// Longest over shortest edge, above one, up to which a block counts as a cube for `--to`: a rounding of texts.
+/// Stretch above 1 up to which a block counts as a cube when all others get operators of their own: levels are texts,
+/// whose numbers are rounded.
 const CUBE_SLACK: f64 = 1e-3;
 
 /// The level with the transport that each block is to have.
@@ -224,7 +234,7 @@ fn adapted(level: &Level, estimates: &[BlockEstimate], args: &AdaptArgs) -> Leve
     level
 }
 
-/// Puts new variants in the place of those that they replace; others stay, for other levels.
+/// Adds variants, and removes those of the same transport, shape and form; all others stay, for other levels.
 fn add_variants(dictionary: &mut Dictionary, made: Vec<Variant>) {
     let is_replaced = |old: &Variant| {
         made.iter().any(|new| {

@@ -1,7 +1,8 @@
 //! `mrt bake`: computes a dictionary.
 
+use crate::cli::dictionary_report::{CouplingReport, StorageArg};
 use crate::cli::dictionary_source::{DEFAULT_PRESET, bake_with_progress};
-use crate::cli::info::{CouplingReport, StorageArg};
+use crate::cli::output::{ReportError, folder_of, print_report};
 use crate::cli::table::Table;
 use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_dictionary::config::{BakeConfig, ConfigError};
@@ -83,20 +84,20 @@ pub enum BakeError {
         /// The file to write.
         file: String,
     },
-    /// There is nowhere to write.
+    /// The folder does not exist.
     #[error("cannot write {file}: found no folder {found}; expected one that exists")]
     NoFolder {
         /// The file to write.
         file: String,
-        /// Where it would be.
+        /// The folder that is missing.
         found: String,
     },
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] ContainerError),
     /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
 #[derive(Serialize)]
@@ -139,20 +140,12 @@ pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
         bytes.len(),
         start.elapsed().as_secs_f64(),
     );
-    if args.json {
-        crate::report_line!("{}", serde_json::to_string(&report)?);
-    } else {
-        print(&report);
-    }
-    Ok(())
+    Ok(print_report(&report, args.json, print)?)
 }
 
-/// A bake takes long; a folder that is not there should not be found out at its end.
+/// Checks that the file can be written: before the bake, which takes long, rather than after it.
 fn check_folder(file: &Path) -> Result<(), BakeError> {
-    let folder = match file.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(file);
     if file.is_dir() {
         Err(BakeError::IsFolder {
             file: file.display().to_string(),

@@ -1,31 +1,25 @@
 //! `mrt demo`: lights a built-in maze, takes pictures and measures time and error.
 
+mod pictures;
+
+use crate::accuracy::exact_level::{ExactLevelError, LevelErrors, measure};
 use crate::cli::dictionary_source::{SourceError, load};
-use crate::cli::reference_level::{LevelErrors, ReferenceLevelError, measure};
+use crate::cli::output::{OutIsFile, ReportError, check_out_folder, print_report};
 use crate::cli::table::Table;
-use crate::render::camera::Camera;
-use crate::render::file::{Saves, WriteError, write_png};
-use crate::render::level_view::{LevelView, ViewError};
-use crate::render::tone::{auto_exposure, tone_map};
-use crate::render::{Picture, render};
+use crate::document::built_in::MAZE;
+use crate::document::level_file::{LevelFileError, read_level};
 use glam::{DVec3, Vec3};
-use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_runtime::{
     AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameConfig, Level, LevelTextError,
     Light, Scene, SkippedLight, StageTimes,
 };
+use pictures::{PictureError, block_size, take_pictures};
 use serde::Serialize;
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-/// The built-in maze: thirteen blocks with a loop and coloured walls.
-pub const MAZE: &str = include_str!("../../../assets/maze.level.toml");
-
-/// Frames over which stage times are taken; the fastest counts, since other programs only slow them.
+/// Frames over which stage times are taken. The fastest counts, since other programs can only slow a frame down.
 const TIMED_FRAMES: usize = 20;
-
-/// sRGB outside the level.
-const BACKGROUND: [u8; 3] = [58, 62, 70];
 
 /// Bounces in pictures and in the second row of errors.
 const BOUNCES: u32 = 8;
@@ -65,52 +59,36 @@ impl Default for DemoArgs {
 /// Why the demo stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
+    /// A file stands where the folder should be.
+    #[error(transparent)]
+    OutIsFile(#[from] OutIsFile),
     /// No dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// The level file cannot be read.
-    #[error("{file}: {source}")]
-    LevelFile {
-        /// Which file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The level is at fault.
-    #[error("{place}: {source}")]
-    Level {
-        /// The file, or "the built-in maze".
-        place: String,
-        /// What is wrong.
-        source: LevelTextError,
-    },
+    /// The level's file cannot be read, or is at fault.
+    #[error(transparent)]
+    LevelFile(#[from] LevelFileError),
+    /// The built-in level is at fault.
+    #[error("the built-in maze: {0}")]
+    Maze(#[from] LevelTextError),
     /// Level and dictionary do not fit.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
-    /// A light is refused.
+    /// A light does not shine.
     #[error(transparent)]
     Skipped(#[from] SkippedLight),
-    /// Nothing can be seen.
-    #[error(transparent)]
-    View(#[from] ViewError),
     /// The exact solution failed.
     #[error(transparent)]
-    Exact(#[from] ReferenceLevelError),
-    /// A file stands where the folder should be.
-    #[error("--out {file}: found a file; expected a folder or a new name")]
-    OutIsFile {
-        /// The file.
-        file: String,
-    },
-    /// A picture cannot be written.
+    Exact(#[from] ExactLevelError),
+    /// There are no pictures.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Pictures(#[from] PictureError),
     /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct DemoReport {
     blocks: usize,
     connections: usize,
@@ -131,63 +109,38 @@ struct DemoReport {
 /// # Errors
 /// [`DemoError`].
 pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
-    // Found out now rather than after the work.
-    if args.out.exists() && !args.out.is_dir() {
-        return Err(DemoError::OutIsFile {
-            file: args.out.display().to_string(),
-        });
-    }
+    check_out_folder(&args.out)?;
     let dictionary = load(args.dictionary.as_deref(), None)?;
-    let level = read_level(args)?;
+    let level = level(args)?;
     let start = Instant::now();
     let scene = Scene::assemble(&level, &dictionary, &AssembleConfig::default())?;
-    let assemble_ms = milliseconds(start.elapsed());
-    let lights = maze_lights(&scene);
+    let assemble_time = start.elapsed();
+    let lights = two_lights(&scene);
     let mut frame = Frame::new(&scene, FrameConfig::default());
     let times = time_frames(&mut frame, &lights)?;
-    let errors = if args.no_exact {
-        None
-    } else {
-        eprintln!("solving the same level exactly, to compare");
-        Some(measure(&level, &scene, &mut frame, &lights, BOUNCES)?)
-    };
-    frame.set_lights(&lights);
-    frame.set_bounces(Bounces::Count(BOUNCES));
-    frame.solve().require_all_lights()?;
-    let pictures = take_pictures(args, &level, &scene, &frame, &lights)?;
-    let report = report(
-        &level,
-        &scene,
-        &dictionary,
-        assemble_ms,
-        times,
+    let errors = compare_with_exact(args, &level, &mut frame, &lights)?;
+    solve_all_bounces(&mut frame, &lights)?;
+    let pictures = take_pictures(&args.out, &frame, &lights)?;
+    let report = DemoReport {
+        assemble_ms: milliseconds(assemble_time),
+        stages_ms: stages(&times),
+        frame_ms: milliseconds(times.total()),
         errors,
         pictures,
-    );
-    if args.json {
-        crate::report_line!("{}", serde_json::to_string(&report)?);
-    } else {
-        print(&report);
-    }
-    Ok(())
+        ..sizes(&level, &scene, &dictionary)
+    };
+    Ok(print_report(&report, args.json, print)?)
 }
 
-fn read_level(args: &DemoArgs) -> Result<Level, DemoError> {
-    let (place, text) = match &args.level {
-        None => ("the built-in maze".to_owned(), MAZE.to_owned()),
-        Some(path) => {
-            let file = path.display().to_string();
-            match std::fs::read_to_string(path) {
-                Ok(text) => (file, text),
-                Err(source) => return Err(DemoError::LevelFile { file, source }),
-            }
-        }
-    };
-    Level::from_text(&text).map_err(|source| DemoError::Level { place, source })
+fn level(args: &DemoArgs) -> Result<Level, DemoError> {
+    Ok(match &args.level {
+        Some(path) => read_level(path)?,
+        None => Level::from_text(MAZE)?,
+    })
 }
 
 /// A warm light in the first block and a cool one in the block farthest from it.
-fn maze_lights(scene: &Scene) -> Vec<Light> {
+fn two_lights(scene: &Scene) -> Vec<Light> {
     let center = |block: usize| scene.level.blocks[block].warp.center();
     let far = (0..scene.level.blocks.len())
         .max_by(|&a, &b| {
@@ -213,11 +166,6 @@ fn maze_lights(scene: &Scene) -> Vec<Light> {
     }
 }
 
-/// Edge of the cube with the block's diagonal, metres.
-fn block_size(warp: &Hexahedron) -> f32 {
-    (warp.diagonal() / 3f64.sqrt()) as f32
-}
-
 /// The fastest of several frames of one bounce, each computed anew.
 fn time_frames(frame: &mut Frame, lights: &[Light]) -> Result<StageTimes, SkippedLight> {
     frame.set_lights(lights);
@@ -236,129 +184,62 @@ fn time_frames(frame: &mut Frame, lights: &[Light]) -> Result<StageTimes, Skippe
     Ok(best.unwrap_or_default())
 }
 
-/// Direct, indirect and both: from above with the ceilings off, and from inside the first block.
-fn take_pictures(
+/// `None` if the user does not want to wait for it.
+fn compare_with_exact(
     args: &DemoArgs,
     level: &Level,
-    scene: &Scene,
-    frame: &Frame,
+    frame: &mut Frame,
     lights: &[Light],
-) -> Result<Vec<String>, DemoError> {
-    std::fs::create_dir_all(&args.out).map_err(|source| WriteError::Io {
-        path: args.out.clone(),
-        source,
-    })?;
-    let (min, max) = level
-        .blocks
-        .iter()
-        .map(|b| b.warp.bounds())
-        .fold((DVec3::MAX, DVec3::MIN), |(lo, hi), (a, b)| {
-            (lo.min(a), hi.max(b))
-        });
-    let (min, max) = (min.as_vec3(), max.as_vec3());
-    let (middle, extent) = (0.5 * (min + max), (max - min).max_element());
-    let size = block_size(&scene.level.blocks[0].warp);
-    let view = |name, from, to, angle, with_ceilings| (name, from, to, angle, with_ceilings);
-    let from_above = middle + Vec3::new(0.0, 1.0 * extent, 0.6 * extent);
-    let eye = scene.level.blocks[0]
-        .warp
-        .point(DVec3::new(0.06, 0.5, 0.5))
-        .as_vec3();
-    let ahead = scene.level.blocks[0]
-        .warp
-        .point(DVec3::new(3.0, 0.42, 0.5))
-        .as_vec3();
-    let views = [
-        view(
-            "above",
-            from_above,
-            middle - Vec3::Y * 0.1 * size,
-            0.75,
-            false,
-        ),
-        view("inside", eye, ahead, 1.25, true),
-    ];
-    let mut written = Vec::new();
-    for (name, from, to, angle, with_ceilings) in views {
-        let shown = LevelView::new(scene, frame, lights, with_ceilings)?;
-        let [width, height] = [960, 640];
-        let Some(camera) = Camera::look_at(from, to, angle, width as f32 / height as f32) else {
-            continue;
-        };
-        let [direct, indirect, both, coverage] =
-            render(&camera, [width, height], 2, |origin, direction| match shown
-                .radiance(origin, direction)
-            {
-                Some((direct, indirect)) => [direct, indirect, direct + indirect, Vec3::ONE],
-                None => [Vec3::ZERO; 4],
-            });
-        // One exposure for the three, so that they can be compared.
-        let exposure = auto_exposure(&[&both]);
-        for (picture, part) in [(direct, "direct"), (indirect, "indirect"), (both, "both")] {
-            let path = args.out.join(format!("{name}-{part}.png"));
-            let mut srgb = tone_map(&picture, exposure);
-            over_background(&mut srgb, &coverage);
-            write_png(&path, [width, height], &srgb, Saves::Time)?;
-            written.push(path.display().to_string());
-        }
+) -> Result<Option<LevelErrors>, ExactLevelError> {
+    if args.no_exact {
+        return Ok(None);
     }
-    Ok(written)
+    eprintln!("solving the same level exactly, to compare");
+    Ok(Some(measure(level, frame, lights, BOUNCES)?))
 }
 
-/// Shows the outside of the level as a plain grey, which no exposure changes.
-fn over_background(srgb: &mut [u8], coverage: &Picture) {
-    for (pixel, coverage) in srgb.as_chunks_mut::<3>().0.iter_mut().zip(&coverage.pixels) {
-        for (value, background) in pixel.iter_mut().zip(BACKGROUND) {
-            *value = value.saturating_add((f32::from(background) * (1.0 - coverage.x)) as u8);
-        }
-    }
+fn solve_all_bounces(frame: &mut Frame, lights: &[Light]) -> Result<(), SkippedLight> {
+    frame.set_lights(lights);
+    frame.set_bounces(Bounces::Count(BOUNCES));
+    frame.solve().require_all_lights()
 }
 
-fn milliseconds(duration: std::time::Duration) -> f64 {
+fn milliseconds(duration: Duration) -> f64 {
     duration.as_secs_f64() * 1e3
 }
 
-fn report(
-    level: &Level,
-    scene: &Scene,
-    dictionary: &Dictionary,
-    assemble_ms: f64,
-    times: StageTimes,
-    errors: Option<LevelErrors>,
-    pictures: Vec<String>,
-) -> DemoReport {
-    let used = |shape| scene.level.blocks.iter().any(|block| block.shape == shape);
+fn stages(times: &StageTimes) -> Vec<(&'static str, f64)> {
+    vec![
+        ("direct light", milliseconds(times.direct)),
+        ("b = T_d->b l", milliseconds(times.coefficients)),
+        ("r = T_b->r b", milliseconds(times.responses)),
+        ("U_b b + U_r r", milliseconds(times.indirect)),
+        ("lightmap atlas", milliseconds(times.lightmap)),
+    ]
+}
+
+/// A report of sizes alone.
+fn sizes(level: &Level, scene: &Scene, dictionary: &Dictionary) -> DemoReport {
+    let is_used = |shape| scene.level.blocks.iter().any(|block| block.shape == shape);
+    let shapes = dictionary.shapes.iter();
+    let modes = shapes
+        .filter(|entry| is_used(entry.shape))
+        .map(|entry| (entry.shape.name, entry.modes()));
     DemoReport {
         blocks: level.blocks.len(),
         connections: level.connections.len(),
         texels: scene.texel_count(),
         preset: dictionary.preset.clone(),
-        modes: dictionary
-            .shapes
-            .iter()
-            .filter(|entry| used(entry.shape))
-            .map(|entry| (entry.shape.name, entry.modes()))
-            .collect(),
+        modes: modes.collect(),
         operator_bytes: scene.operator_bytes(),
         dictionary_bytes: dictionary.bytes(),
-        assemble_ms,
-        stages_ms: vec![
-            ("direct light", milliseconds(times.direct)),
-            ("b = T_d->b l", milliseconds(times.coefficients)),
-            ("r = T_b->r b", milliseconds(times.responses)),
-            ("U_b b + U_r r", milliseconds(times.indirect)),
-            ("lightmap atlas", milliseconds(times.lightmap)),
-        ],
-        frame_ms: milliseconds(times.total()),
-        errors,
-        pictures,
+        ..DemoReport::default()
     }
 }
 
 fn print(report: &DemoReport) {
-    let modes: Vec<String> = report
-        .modes
-        .iter()
+    let modes = report.modes.iter();
+    let modes: Vec<String> = modes
         .map(|(shape, modes)| format!("{shape} {modes}"))
         .collect();
     crate::report_line!(
@@ -375,35 +256,41 @@ fn print(report: &DemoReport) {
         report.dictionary_bytes / 1024
     );
     let mut table = Table::new(&["stage of a frame (one core, one bounce)", "ms"]);
-    for (stage, ms) in &report.stages_ms {
+    let totals = [
+        ("whole frame", report.frame_ms),
+        ("assembling the level (once)", report.assemble_ms),
+    ];
+    for (stage, ms) in report.stages_ms.iter().chain(&totals) {
         table.row([(*stage).to_owned(), format!("{ms:.3}")]);
     }
-    table.row(["whole frame".to_owned(), format!("{:.3}", report.frame_ms)]);
-    table.row([
-        "assembling the level (once)".to_owned(),
-        format!("{:.3}", report.assemble_ms),
-    ]);
     crate::report_line!("{table}");
     if let Some(errors) = &report.errors {
-        let percent = |x: f64| format!("{:.2} %", 100.0 * x);
-        let mut table = Table::new(&["error against the exact solution", "relative L2"]);
-        table.row([
-            "indirect light, first bounce".to_owned(),
-            percent(errors.first_bounce),
-        ]);
-        table.row([
-            format!("indirect light, {BOUNCES} bounces"),
-            percent(errors.many_bounces),
-        ]);
-        table.row([
-            format!("direct and indirect, {BOUNCES} bounces"),
-            percent(errors.total),
-        ]);
-        crate::report_line!("{table}");
-        crate::report_line!("the exact solution took {:.1} s\n", errors.exact_seconds);
+        print_errors(errors);
     }
     crate::report_line!("pictures:");
     for picture in &report.pictures {
         crate::report_line!("  {picture}");
     }
+}
+
+fn print_errors(errors: &LevelErrors) {
+    let mut table = Table::new(&["error against the exact solution", "relative L2"]);
+    for (light, error) in [
+        (
+            "indirect light, first bounce".to_owned(),
+            errors.first_bounce,
+        ),
+        (
+            format!("indirect light, {BOUNCES} bounces"),
+            errors.many_bounces,
+        ),
+        (
+            format!("direct and indirect, {BOUNCES} bounces"),
+            errors.total,
+        ),
+    ] {
+        table.row([light, format!("{:.2} %", 100.0 * error)]);
+    }
+    crate::report_line!("{table}");
+    crate::report_line!("the exact solution took {:.1} s\n", errors.exact_seconds);
 }

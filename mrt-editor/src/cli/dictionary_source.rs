@@ -1,16 +1,16 @@
-//! Where a command's dictionary comes from: a file, a preset baked on the spot, or the default that is
-//! part of the program.
+//! Where a command's dictionary comes from: a file, a preset baked on the spot, or the default that is part of the
+//! program.
 
+use crate::cli::progress::with_progress;
 use mrt_core::container::{ByteBudget, ContainerError, read_file};
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::modular::bake::bake;
-use mrt_dictionary::progress::{Cancelled, Progress};
+use mrt_dictionary::progress::Cancelled;
+use mrt_runtime::low_level::modular::dictionary::StoredDictionary;
 use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
 use mrt_runtime::{Dictionary, DictionaryError};
-use std::io::{IsTerminal, Write};
+use std::borrow::Cow;
 use std::path::Path;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The preset whose dictionary is part of the program.
 pub const DEFAULT_PRESET: &str = "standard";
@@ -19,7 +19,7 @@ pub const DEFAULT_PRESET: &str = "standard";
 pub const DEFAULT_SET: &str = "cubes-2d";
 
 /// The default dictionary, as `mrt bake` writes it.
-pub static DEFAULT_DICTIONARY: &[u8] = include_bytes!("../../../assets/cubes-2d-standard.mrt");
+static DEFAULT_DICTIONARY: &[u8] = include_bytes!("../../../assets/cubes-2d-standard.mrt");
 
 /// Why there is no dictionary.
 #[derive(Debug, thiserror::Error)]
@@ -56,15 +56,15 @@ pub fn load(file: Option<&Path>, preset: Option<&str>) -> Result<Dictionary, Sou
     }
 }
 
-/// A preset's dictionary of a set of shapes; without a preset, the default's. All but the one that is part of the
-/// program are baked now.
+/// A preset's dictionary of a set of shapes; without a preset, the default's. All dictionaries but the one that is part
+/// of the program are baked now.
 ///
 /// # Errors
 /// [`SourceError::Config`] and [`SourceError::Cancelled`].
 pub fn from_preset(set: &str, preset: Option<&str>) -> Result<Dictionary, SourceError> {
     let preset = preset.unwrap_or(DEFAULT_PRESET);
     if (set, preset) == (DEFAULT_SET, DEFAULT_PRESET) {
-        return parse(DEFAULT_DICTIONARY, "the built-in dictionary".to_owned());
+        return DictionaryBytes::built_in().read();
     }
     let mut config = BakeConfig::preset(preset)?;
     set.clone_into(&mut config.shapes);
@@ -77,29 +77,7 @@ pub fn from_preset(set: &str, preset: Option<&str>) -> Result<Dictionary, Source
 /// # Errors
 /// [`SourceError::File`] and [`SourceError::Dictionary`].
 pub fn from_file(path: &Path) -> Result<Dictionary, SourceError> {
-    let bytes = read_dictionary_file(path)?;
-    parse(&bytes, path.display().to_string())
-}
-
-/// The bytes of a file that may be a dictionary.
-///
-/// # Errors
-/// [`SourceError::File`] and [`SourceError::Dictionary`].
-pub fn read_dictionary_file(path: &Path) -> Result<Vec<u8>, SourceError> {
-    let bytes = read_file(path, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET));
-    bytes.map_err(|error| match error {
-        // These name the file themselves.
-        ContainerError::Io { .. } => SourceError::File(error),
-        other => SourceError::Dictionary {
-            place: path.display().to_string(),
-            source: other.into(),
-        },
-    })
-}
-
-fn parse(bytes: &[u8], place: String) -> Result<Dictionary, SourceError> {
-    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
-        .map_err(|source| SourceError::Dictionary { place, source })
+    DictionaryBytes::of_file(path)?.read()
 }
 
 /// Bakes with progress on standard error; an interrupt (Ctrl-C) stops it and leaves no file.
@@ -112,32 +90,81 @@ pub fn bake_with_progress(config: &BakeConfig) -> Result<Dictionary, Cancelled> 
     })
 }
 
-/// Runs long work with progress on standard error; an interrupt (Ctrl-C) asks it to stop.
-pub fn with_progress<T>(name: &str, work: impl FnOnce(&Progress) -> T) -> T {
-    let terminal = std::io::stderr().is_terminal();
-    let report = |what: &str, step: usize, steps: usize| {
-        let line = format!("{name}: step {step} of {steps}, {what}");
-        // On a terminal one line is rewritten; in a log every step keeps its own.
-        if terminal {
-            eprint!("\r\x1b[K{line}");
-            // Progress that cannot be shown is no reason to stop.
-            let _ = std::io::stderr().flush();
-        } else {
-            eprintln!("{line}");
-        }
-    };
-    let result = work(&Progress::new(&report, interrupted()));
-    if terminal {
-        eprintln!();
-    }
-    result
+/// Bytes that should be a dictionary, and where they come from.
+#[derive(Clone, Debug)]
+pub struct DictionaryBytes {
+    bytes: Cow<'static, [u8]>,
+    place: String,
 }
 
-/// Set when the user interrupts the program.
-fn interrupted() -> &'static AtomicBool {
-    static FLAG: AtomicBool = AtomicBool::new(false);
-    static HANDLER: OnceLock<bool> = OnceLock::new();
-    // Without a handler an interrupt ends the program at once, which leaves no file either.
-    HANDLER.get_or_init(|| ctrlc::set_handler(|| FLAG.store(true, Ordering::Relaxed)).is_ok());
-    &FLAG
+impl DictionaryBytes {
+    /// Those of a file, or of the default dictionary.
+    ///
+    /// # Errors
+    /// [`SourceError::File`] and [`SourceError::Dictionary`].
+    pub fn of(file: Option<&Path>) -> Result<Self, SourceError> {
+        file.map_or_else(|| Ok(Self::built_in()), Self::of_file)
+    }
+
+    /// Those of a file.
+    ///
+    /// # Errors
+    /// [`SourceError::File`] and [`SourceError::Dictionary`].
+    pub fn of_file(path: &Path) -> Result<Self, SourceError> {
+        let place = path.display().to_string();
+        match read_file(path, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET)) {
+            Ok(bytes) => Ok(Self {
+                bytes: bytes.into(),
+                place,
+            }),
+            // Its message names the file already.
+            Err(error @ ContainerError::Io { .. }) => Err(SourceError::File(error)),
+            Err(error) => Err(SourceError::Dictionary {
+                place,
+                source: error.into(),
+            }),
+        }
+    }
+
+    /// Those of the default dictionary.
+    pub fn built_in() -> Self {
+        Self {
+            bytes: DEFAULT_DICTIONARY.into(),
+            place: "the built-in dictionary".to_owned(),
+        }
+    }
+
+    /// Number of bytes.
+    pub fn count(&self) -> usize {
+        self.bytes.len()
+    }
+
+    /// The dictionary with all matrices as `f32`.
+    ///
+    /// # Errors
+    /// [`SourceError::Dictionary`].
+    pub fn read(&self) -> Result<Dictionary, SourceError> {
+        self.named(Dictionary::from_bytes_within(
+            &self.bytes,
+            &mut ByteBudget::new(DEFAULT_BYTE_BUDGET),
+        ))
+    }
+
+    /// The dictionary with matrices as they are stored.
+    ///
+    /// # Errors
+    /// [`SourceError::Dictionary`].
+    pub fn read_stored(&self) -> Result<StoredDictionary<'_>, SourceError> {
+        self.named(StoredDictionary::read(
+            &self.bytes,
+            &mut ByteBudget::new(DEFAULT_BYTE_BUDGET),
+        ))
+    }
+
+    fn named<T>(&self, result: Result<T, DictionaryError>) -> Result<T, SourceError> {
+        result.map_err(|source| SourceError::Dictionary {
+            place: self.place.clone(),
+            source,
+        })
+    }
 }

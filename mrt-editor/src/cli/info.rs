@@ -1,16 +1,14 @@
 //! `mrt info`: what a dictionary file holds.
 
-use crate::cli::dictionary_source::{SourceError, read_dictionary_file};
+use crate::cli::dictionary_report::{CouplingReport, kind_bytes};
+use crate::cli::dictionary_source::{DictionaryBytes, SourceError};
+use crate::cli::output::{ReportError, print_report};
 use crate::cli::table::Table;
-use mrt_core::container::ByteBudget;
-use mrt_core::storage::Storage;
+use mrt_core::storage::StoredMatrix;
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_runtime::Dictionary;
-use mrt_runtime::low_level::modular::dictionary::{OperatorKind, StoredDictionary};
-use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
+use mrt_runtime::low_level::modular::dictionary::{ShapeOperators, StoredDictionary};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Shows a dictionary's shapes, ranks and sizes.
@@ -27,51 +25,6 @@ pub struct InfoArgs {
     pub json: bool,
 }
 
-/// How numbers are stored.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum StorageArg {
-    /// Four bytes a number, exact.
-    F32,
-    /// Two bytes: within 0.03 % of f32.
-    F16,
-    /// One byte for most: within 0.5 % of f32.
-    Int8,
-}
-
-impl From<StorageArg> for Storage {
-    fn from(arg: StorageArg) -> Storage {
-        match arg {
-            StorageArg::F32 => Storage::F32,
-            StorageArg::F16 => Storage::F16,
-            StorageArg::Int8 => Storage::Int8,
-        }
-    }
-}
-
-/// How a kind of operator is stored, and in how many bytes; kinds without elements are left out.
-pub(super) fn kind_bytes(dictionary: &StoredDictionary) -> BTreeMap<OperatorKind, KindBytes> {
-    let mut kinds: BTreeMap<OperatorKind, KindBytes> = BTreeMap::new();
-    dictionary.map(|kind, matrix| {
-        if matrix.rows() * matrix.columns() == 0 {
-            return;
-        }
-        let storage = matrix.storage().name();
-        let entry = kinds.entry(kind).or_insert(KindBytes { bytes: 0, storage });
-        entry.bytes += matrix.bytes();
-        if entry.storage != storage {
-            entry.storage = "mixed";
-        }
-    });
-    kinds
-}
-
-/// See [`kind_bytes`].
-pub(super) struct KindBytes {
-    pub(super) bytes: usize,
-    /// "mixed" if not all are alike.
-    pub(super) storage: &'static str,
-}
-
 /// Why there is nothing to show.
 #[derive(Debug, thiserror::Error)]
 pub enum InfoError {
@@ -82,8 +35,8 @@ pub enum InfoError {
     #[error(transparent)]
     Cancelled(#[from] Cancelled),
     /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
 #[derive(Serialize)]
@@ -100,47 +53,6 @@ struct Info<'a> {
     operators: Vec<KindInfo>,
     #[serde(skip_serializing_if = "Option::is_none")]
     spectra: Option<Vec<SpectrumInfo>>,
-}
-
-/// How light gets from block to block.
-#[derive(Serialize)]
-pub(super) struct CouplingReport {
-    lightfield_modes: usize,
-    lightfield_dropped_energy: f32,
-    emission_modes: usize,
-    emission_dropped_energy: f32,
-    response_modes: usize,
-    response_dropped_energy: f32,
-    paths: usize,
-}
-
-impl CouplingReport {
-    pub(super) fn of<M>(dictionary: &Dictionary<M>) -> Self {
-        let (fields, paths) = (&dictionary.lightfields, &dictionary.paths);
-        Self {
-            lightfield_modes: fields.parity.len(),
-            lightfield_dropped_energy: fields.dropped_energy,
-            emission_modes: paths.emission_parity.len(),
-            emission_dropped_energy: paths.emission_dropped_energy,
-            response_modes: paths.response_parity.len(),
-            response_dropped_energy: paths.response_dropped_energy,
-            paths: paths.entries.len(),
-        }
-    }
-
-    pub(super) fn print(&self) {
-        crate::report_line!(
-            "between blocks: {} paths from {} emission modes (energy dropped {:.2e}) to {} response modes \
-             ({:.2e}); {} lightfield modes ({:.2e})",
-            self.paths,
-            self.emission_modes,
-            self.emission_dropped_energy,
-            self.response_modes,
-            self.response_dropped_energy,
-            self.lightfield_modes,
-            self.lightfield_dropped_energy,
-        );
-    }
 }
 
 #[derive(Serialize)]
@@ -177,25 +89,20 @@ struct SpectrumInfo {
 /// # Errors
 /// [`InfoError`].
 pub fn run(args: &InfoArgs) -> Result<(), InfoError> {
-    let bytes = read_dictionary_file(&args.file)?;
-    let mut budget = ByteBudget::new(DEFAULT_BYTE_BUDGET);
-    let dictionary = StoredDictionary::read(&bytes, &mut budget).map_err(|source| {
-        let place = args.file.display().to_string();
-        SourceError::Dictionary { place, source }
-    })?;
-    let spectra = if args.spectrum {
-        let spectra = closed_cube_spectra(dictionary.resolution, &Progress::silent())?;
-        Some(spectra.iter().map(spectrum_info).collect())
-    } else {
-        None
-    };
+    let bytes = DictionaryBytes::of_file(&args.file)?;
+    let dictionary = bytes.read_stored()?;
+    let spectra = spectra(args, dictionary.resolution)?;
     let info = info(args, &dictionary, spectra);
-    if args.json {
-        crate::report_line!("{}", serde_json::to_string(&info)?);
-    } else {
-        print(&info);
+    Ok(print_report(&info, args.json, print)?)
+}
+
+/// `None` if the user did not ask for it.
+fn spectra(args: &InfoArgs, resolution: usize) -> Result<Option<Vec<SpectrumInfo>>, Cancelled> {
+    if !args.spectrum {
+        return Ok(None);
     }
-    Ok(())
+    let spectra = closed_cube_spectra(resolution, &Progress::silent())?;
+    Ok(Some(spectra.iter().map(spectrum_info).collect()))
 }
 
 fn spectrum_info(spectrum: &Spectrum) -> SpectrumInfo {
@@ -214,6 +121,7 @@ fn info<'a>(
     dictionary: &'a StoredDictionary,
     spectra: Option<Vec<SpectrumInfo>>,
 ) -> Info<'a> {
+    let operators = kind_bytes(dictionary).into_iter();
     Info {
         file: args.file.display().to_string(),
         preset: &dictionary.preset,
@@ -221,29 +129,9 @@ fn info<'a>(
         resolution: dictionary.resolution,
         bytes: dictionary.bytes(),
         coupling: CouplingReport::of(dictionary),
-        shapes: dictionary
-            .shapes
-            .iter()
-            .map(|entry| ShapeInfo {
-                shape: entry.shape.name,
-                openings: entry
-                    .shape
-                    .openings
-                    .iter()
-                    .map(|opening| opening.face.name())
-                    .collect(),
-                texels: entry.joint_basis.rows(),
-                joint_modes: entry.joint_modes(),
-                modes: entry.modes(),
-                dropped_energy: entry.dropped_energy,
-                largest_singular_value: entry.singular_values.first().copied().unwrap_or(0.0),
-                smallest_singular_value: entry.singular_values.last().copied().unwrap_or(0.0),
-                bytes: entry.bytes(),
-            })
-            .collect(),
+        shapes: dictionary.shapes.iter().map(shape_info).collect(),
         variants: dictionary.variants.len(),
-        operators: kind_bytes(dictionary)
-            .into_iter()
+        operators: operators
             .map(|(kind, entry)| KindInfo {
                 kind: kind.name(),
                 storage: entry.storage,
@@ -254,9 +142,37 @@ fn info<'a>(
     }
 }
 
+fn shape_info(entry: &ShapeOperators<StoredMatrix>) -> ShapeInfo {
+    let openings = entry.shape.openings.iter();
+    ShapeInfo {
+        shape: entry.shape.name,
+        openings: openings.map(|opening| opening.face.name()).collect(),
+        texels: entry.joint_basis.rows(),
+        joint_modes: entry.joint_modes(),
+        modes: entry.modes(),
+        dropped_energy: entry.dropped_energy,
+        largest_singular_value: entry.singular_values.first().copied().unwrap_or(0.0),
+        smallest_singular_value: entry.singular_values.last().copied().unwrap_or(0.0),
+        bytes: entry.bytes(),
+    }
+}
+
 fn print(info: &Info) {
     crate::report_line!("{}", info.file);
     crate::report_line!("preset {}: {}", info.preset, info.settings);
+    print_shapes(&info.shapes);
+    info.coupling.print();
+    print_operators(&info.operators);
+    if info.variants > 0 {
+        crate::report_line!("{} variants of shapes", info.variants);
+    }
+    crate::report_line!("{} bytes of matrices", info.bytes);
+    if let Some(spectra) = &info.spectra {
+        print_spectra(spectra);
+    }
+}
+
+fn print_shapes(shapes: &[ShapeInfo]) {
     let mut table = Table::new(&[
         "shape",
         "openings",
@@ -267,7 +183,7 @@ fn print(info: &Info) {
         "energy dropped",
         "bytes",
     ]);
-    for shape in &info.shapes {
+    for shape in shapes {
         table.row([
             shape.shape.to_owned(),
             shape.openings.join(" "),
@@ -283,9 +199,11 @@ fn print(info: &Info) {
         ]);
     }
     crate::report!("{table}");
-    info.coupling.print();
+}
+
+fn print_operators(operators: &[KindInfo]) {
     let mut table = Table::new(&["operators", "storage", "bytes"]);
-    for kind in &info.operators {
+    for kind in operators {
         table.row([
             kind.kind.to_owned(),
             kind.storage.to_owned(),
@@ -293,22 +211,19 @@ fn print(info: &Info) {
         ]);
     }
     crate::report!("{table}");
-    if info.variants > 0 {
-        crate::report_line!("{} variants of shapes", info.variants);
+}
+
+fn print_spectra(spectra: &[SpectrumInfo]) {
+    crate::report_line!("\nsingular values that hold a share of the energy, closed cube:");
+    let mut table = Table::new(&["matrix", "size", "80 %", "90 %", "95 %"]);
+    for spectrum in spectra {
+        table.row([
+            spectrum.matrix.to_owned(),
+            format!("{} x {}", spectrum.size[0], spectrum.size[1]),
+            spectrum.values_for_80_percent.to_string(),
+            spectrum.values_for_90_percent.to_string(),
+            spectrum.values_for_95_percent.to_string(),
+        ]);
     }
-    crate::report_line!("{} bytes of matrices", info.bytes);
-    if let Some(spectra) = &info.spectra {
-        crate::report_line!("\nsingular values that hold a share of the energy, closed cube:");
-        let mut table = Table::new(&["matrix", "size", "80 %", "90 %", "95 %"]);
-        for spectrum in spectra {
-            table.row([
-                spectrum.matrix.to_owned(),
-                format!("{} x {}", spectrum.size[0], spectrum.size[1]),
-                spectrum.values_for_80_percent.to_string(),
-                spectrum.values_for_90_percent.to_string(),
-                spectrum.values_for_95_percent.to_string(),
-            ]);
-        }
-        crate::report!("{table}");
-    }
+    crate::report!("{table}");
 }

@@ -1,14 +1,15 @@
 //! `mrt map`: writes a level around a mesh.
 
-use crate::cli::output::is_same_place;
+use crate::cli::import_args::{ImportArgs, import_hint, print_import};
+use crate::cli::output::{ReportError, is_same_place, print_report, print_row};
+use crate::document::level_file::{LevelFileError, write_level};
+use crate::fit_level::config::{Fit, MapConfig, MapError};
 use crate::fit_level::paint::Coverage;
 use crate::fit_level::voxels::Winding;
-use crate::fit_level::{Fit, MapConfig, MapError, Mapped, map_mesh};
+use crate::fit_level::{Mapped, map_mesh};
 use crate::import::error::ImportError;
+use crate::import::read_scene;
 use crate::import::report::ImportReport;
-use crate::import::{ImportConfig, UpAxis, read_scene};
-use mrt_core::container::{ContainerError, write_file_atomically};
-use mrt_runtime::LevelTextError;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -52,52 +53,46 @@ pub struct MapArgs {
     pub json: bool,
 }
 
-/// How a mesh is read; `map` and `light` must be given the same.
-#[derive(Clone, Copy, Debug, clap::Args)]
-pub struct ImportArgs {
-    /// Metres per unit of the mesh file.
-    #[arg(long, default_value_t = 1.0)]
-    pub scale: f64,
-    /// The mesh file's vertical axis.
-    #[arg(long, value_enum, default_value = "y")]
-    pub up: UpAxis,
-    /// Albedo for everything, 0 to 1, instead of the mesh's colours.
-    #[arg(long)]
-    pub albedo: Option<f32>,
-}
-
-impl ImportArgs {
-    /// The same as settings.
-    pub fn config(&self) -> ImportConfig {
-        ImportConfig {
-            scale: self.scale,
-            up: self.up,
-            albedo: self.albedo,
-        }
-    }
-}
-
 /// Why no level was written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapCommandError {
     /// The mesh cannot be read.
-    #[error(transparent)]
-    Import(#[from] ImportError),
+    #[error("{source}{}", import_hint(source))]
+    Import {
+        /// Why.
+        #[from]
+        source: ImportError,
+    },
     /// The mesh has no level.
+    #[error("{source}{}", hint(source))]
+    Map {
+        /// Why.
+        #[from]
+        source: MapError,
+    },
+    /// The level has no text, or its file cannot be written.
     #[error(transparent)]
-    Map(#[from] MapError),
-    /// The level has no text.
+    Level(#[from] LevelFileError),
+    /// The report has no form as JSON.
     #[error(transparent)]
-    Text(#[from] LevelTextError),
-    /// The file cannot be written.
-    #[error(transparent)]
-    Write(#[from] ContainerError),
+    Report(#[from] ReportError),
     /// The level would replace the mesh.
     #[error("--out {}: found the mesh itself; expected another file", path.display())]
     OutIsScene {
         /// The file.
         path: PathBuf,
     },
+}
+
+/// The flags that may help, as the end of an error's line.
+fn hint(error: &MapError) -> &'static str {
+    match error {
+        MapError::NoFreeSpace => {
+            "; try --winding both, or --fit box for one block around everything"
+        }
+        MapError::TooDense => " (try a larger --cell)",
+        _ => "",
+    }
 }
 
 #[derive(Serialize)]
@@ -127,7 +122,14 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
     }
     let start = Instant::now();
     let scene = read_scene(&args.scene, &args.import.config())?;
-    let config = MapConfig {
+    let mapped = map_mesh(&scene.mesh, &config(args))?;
+    write_level(&args.out, &mapped.level)?;
+    let report = Report::new(scene.report, &mapped, start);
+    Ok(print_report(&report, args.json, Report::print)?)
+}
+
+fn config(args: &MapArgs) -> MapConfig {
+    MapConfig {
         fit: args.fit,
         cell: args.cell,
         max_blocks: args.max_blocks,
@@ -135,17 +137,7 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
         tolerance: args.tolerance,
         crumb_share: args.crumbs,
         winding: args.winding,
-    };
-    let mapped = map_mesh(&scene.mesh, &config)?;
-    write_file_atomically(&args.out, mapped.level.to_text()?.as_bytes())?;
-    let report = Report::new(scene.report, &mapped, start);
-    if args.json {
-        // A struct of numbers and names always has a text.
-        crate::report_line!("{}", serde_json::to_string(&report).unwrap_or_default());
-    } else {
-        report.print();
     }
-    Ok(())
 }
 
 impl Report {
@@ -170,66 +162,22 @@ impl Report {
     }
 
     fn print(&self) {
-        let mesh = &self.mesh;
-        mesh.print();
-        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
-        row("blocks", self.blocks.to_string());
-        row("connections", self.connections.to_string());
+        print_import(&self.mesh);
+        print_row("blocks", self.blocks);
+        print_row("connections", self.connections);
         for (shape, count) in &self.shapes {
-            row(&format!("  {shape}"), count.to_string());
+            print_row(&format!("  {shape}"), count);
         }
-        row("cell", format!("{:.3} m", self.cell_m));
-        row("dropped crumbs", self.dropped_crumbs.to_string());
-        row("dropped misfits", self.dropped_misfits.to_string());
-        row("closed passages", self.closed_passages.to_string());
+        print_row("cell", format!("{:.3} m", self.cell_m));
+        print_row("dropped crumbs", self.dropped_crumbs);
+        print_row("dropped misfits", self.dropped_misfits);
+        print_row("closed passages", self.closed_passages);
         if self.faces_reversed {
-            row(
-                "faces",
-                "turned away from the rooms; taken as reversed".to_owned(),
-            );
+            print_row("faces", "turned away from the rooms; taken as reversed");
         }
-        row(
-            "area inside blocks",
-            format!("{:.1} %", 100.0 * self.area_share.inside),
-        );
-        row(
-            "area in or near",
-            format!("{:.1} %", 100.0 * self.area_share.near),
-        );
-        row("seconds", format!("{:.2}", self.seconds));
-    }
-}
-
-impl ImportReport {
-    /// Prints the report's rows.
-    pub fn print(&self) {
-        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
-        let [x, y, z] = self.size_m;
-        row("triangles", self.triangles.to_string());
-        row(
-            "  left out",
-            format!(
-                "{} without area, {} not finite; {} unused vertices",
-                self.degenerate_triangles, self.not_finite_triangles, self.unused_vertices
-            ),
-        );
-        row(
-            "edges",
-            format!(
-                "{} non-manifold, {} boundary",
-                self.non_manifold_edges, self.boundary_edges
-            ),
-        );
-        row(
-            "size",
-            format!("{x:.3} x {y:.3} x {z:.3} m at {} m a unit", self.scale),
-        );
-        row(
-            "materials",
-            format!(
-                "{}; {} moved into 0.05..0.9, {} made up from names",
-                self.materials, self.clamped_albedos, self.made_up_albedos
-            ),
-        );
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        print_row("area inside blocks", percent(self.area_share.inside));
+        print_row("area in or near", percent(self.area_share.near));
+        print_row("seconds", format!("{:.2}", self.seconds));
     }
 }

@@ -1,19 +1,26 @@
-//! Output: standard output that may be a closed pipe or a full disk, and files that must not be replaced.
+//! What a command leaves: a report on standard output, which may be a closed pipe or a full disk, files that must not
+//! replace its inputs, and an exit code.
 
+use serde::Serialize;
 use std::fmt::{Arguments, Display};
 use std::io::{ErrorKind, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What the process ends with: on failure with status 1 and the error as one line on standard error.
+/// What the process ends with: on failure status 1, after the error as one line on standard error.
 pub fn exit_code(result: Result<(), impl Display>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("{}: {error}", program_name());
+            warn(format_args!("{error}"));
             ExitCode::FAILURE
         }
     }
+}
+
+/// Writes one line to standard error, after the program's name.
+pub fn warn(text: Arguments<'_>) {
+    eprintln!("{}: {text}", program_name());
 }
 
 /// The name by which the program was called, without its folder and extension.
@@ -24,13 +31,13 @@ fn program_name() -> String {
 }
 
 /// Writes to standard output. When nobody reads it any more, the program ends quietly. When writing fails, the program
-/// ends with status 1 and a message, since only the report is left to do by then.
+/// ends with status 1 and a message: all that is left to do by then is the report.
 pub fn write(text: Arguments<'_>) {
     if let Err(error) = std::io::stdout().lock().write_fmt(text) {
         if error.kind() == ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        eprintln!("{}: standard output: {error}", program_name());
+        warn(format_args!("standard output: {error}"));
         std::process::exit(1);
     }
 }
@@ -48,7 +55,72 @@ macro_rules! report_line {
     ($($part:tt)*) => { $crate::cli::output::write(format_args!("{}\n", format_args!($($part)*))) };
 }
 
-/// True when both paths are there and lead to the same file or folder.
+/// A report has no form as JSON.
+#[derive(Debug, thiserror::Error)]
+#[error("the report cannot be printed: {0}")]
+pub struct ReportError(#[from] serde_json::Error);
+
+/// Prints a report: with `json` as one line of JSON, otherwise as `print` does it for people.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn print_report<R: Serialize>(
+    report: &R,
+    json: bool,
+    print: impl FnOnce(&R),
+) -> Result<(), ReportError> {
+    if json {
+        print_json(report)
+    } else {
+        print(report);
+        Ok(())
+    }
+}
+
+/// Prints one line of JSON.
+///
+/// # Errors
+/// [`ReportError`].
+pub fn print_json(record: &impl Serialize) -> Result<(), ReportError> {
+    crate::report_line!("{}", serde_json::to_string(record)?);
+    Ok(())
+}
+
+/// Prints a named value, in line with the others.
+pub fn print_row(name: &str, value: impl Display) {
+    crate::report_line!("{name:<22} {value}");
+}
+
+/// A file stands where the output folder should be.
+#[derive(Debug, thiserror::Error)]
+#[error("--out {}: found a file; expected a folder or a new name", path.display())]
+pub struct OutIsFile {
+    /// The file.
+    pub path: PathBuf,
+}
+
+/// Checks that `out` is or can become a folder: before the work rather than after it.
+///
+/// # Errors
+/// [`OutIsFile`].
+pub fn check_out_folder(out: &Path) -> Result<(), OutIsFile> {
+    if out.exists() && !out.is_dir() {
+        return Err(OutIsFile {
+            path: out.to_owned(),
+        });
+    }
+    Ok(())
+}
+
+/// The folder that a file is in.
+pub fn folder_of(file: &Path) -> &Path {
+    match file.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// True when both paths exist and lead to the same file or folder.
 pub fn is_same_place(a: &Path, b: &Path) -> bool {
     match (a.canonicalize(), b.canonicalize()) {
         (Ok(a), Ok(b)) => a == b,

@@ -1,17 +1,16 @@
 //! `mrt pack`: the part of a dictionary that a level uses.
 
-use crate::cli::accuracy::CouplingArg;
-use crate::cli::dictionary_source::{DEFAULT_DICTIONARY, SourceError, read_dictionary_file};
-use crate::cli::info::{StorageArg, kind_bytes};
-use crate::cli::output::is_same_place;
+use crate::cli::dictionary_report::{CouplingArg, KindBytes, StorageArg, kind_bytes};
+use crate::cli::dictionary_source::{DictionaryBytes, SourceError};
+use crate::cli::output::{ReportError, is_same_place, print_report};
 use crate::cli::table::Table;
 use crate::document::level_file::{LevelFileError, read_level};
-use mrt_core::container::{ByteBudget, ContainerError, write_file_atomically};
+use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_runtime::low_level::modular::dictionary::{OperatorKind, StoredDictionary};
-use mrt_runtime::low_level::modular::dictionary_file::DEFAULT_BYTE_BUDGET;
 use mrt_runtime::low_level::modular::pack::{PackConfig, pack};
 use mrt_runtime::{AssembleError, DictionaryError};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Writes the part of a dictionary that a level uses: its shapes and the paths that light takes in it.
@@ -73,11 +72,11 @@ pub enum PackError {
     #[error(transparent)]
     File(#[from] ContainerError),
     /// The report has no form as JSON.
-    #[error("the report cannot be printed: {0}")]
-    Report(#[from] serde_json::Error),
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct PackReport {
     file: String,
     shapes: Vec<&'static str>,
@@ -109,43 +108,35 @@ pub fn run(args: &PackArgs) -> Result<(), PackError> {
             path: args.out.clone(),
         });
     }
-    let (bytes, place) = match &args.dictionary {
-        Some(path) => (read_dictionary_file(path)?, path.display().to_string()),
-        None => (
-            DEFAULT_DICTIONARY.to_vec(),
-            "the built-in dictionary".to_owned(),
-        ),
-    };
-    let mut budget = ByteBudget::new(DEFAULT_BYTE_BUDGET);
-    let whole = StoredDictionary::read(&bytes, &mut budget)
-        .map_err(|source| SourceError::Dictionary { place, source })?;
-    let config = PackConfig {
-        probes: !args.no_probes,
-        vector: !args.no_vector,
-        sources: args.keep_sources,
-        lightfields: !matches!(args.coupling, Some(CouplingArg::Table)),
-    };
-    let part = pack(&level, &whole, &config)?;
+    let source = DictionaryBytes::of(args.dictionary.as_deref())?;
+    let whole = source.read_stored()?;
+    let part = pack(&level, &whole, &config(args))?;
     let packed = match args.storage {
         Some(storage) => part.stored_as(storage.into()),
         None => part.clone(),
     };
-    let packed_bytes = packed.to_bytes()?;
-    write_file_atomically(&args.out, &packed_bytes)?;
-    let report = report(args, (&whole, bytes.len()), (&packed, packed_bytes.len()));
-    if args.json {
-        crate::report_line!("{}", serde_json::to_string(&report)?);
-    } else {
-        print(&report);
-    }
-    Ok(())
+    let bytes = packed.to_bytes()?;
+    write_file_atomically(&args.out, &bytes)?;
+    let report = PackReport {
+        file: args.out.display().to_string(),
+        file_bytes_before: source.count(),
+        file_bytes: bytes.len(),
+        ..contents(&whole, &packed)
+    };
+    Ok(print_report(&report, args.json, print)?)
 }
 
-fn report(
-    args: &PackArgs,
-    (whole, file_bytes_before): (&StoredDictionary, usize),
-    (packed, file_bytes): (&StoredDictionary, usize),
-) -> PackReport {
+fn config(args: &PackArgs) -> PackConfig {
+    PackConfig {
+        probes: !args.no_probes,
+        vector: !args.no_vector,
+        sources: args.keep_sources,
+        lightfields: !matches!(args.coupling, Some(CouplingArg::Table)),
+    }
+}
+
+/// A report of what was kept and what was left out, without files.
+fn contents(whole: &StoredDictionary, packed: &StoredDictionary) -> PackReport {
     let names = |kept: bool| {
         let entries = whole.shapes.iter();
         entries
@@ -153,8 +144,22 @@ fn report(
             .map(|entry| entry.shape.name)
             .collect()
     };
-    let (before, after) = (kind_bytes(whole), kind_bytes(packed));
-    let kinds = OperatorKind::ALL.into_iter().filter_map(|kind| {
+    PackReport {
+        shapes: names(true),
+        shapes_left_out: names(false),
+        variants: packed.variants.len(),
+        paths: packed.paths.entries.len(),
+        paths_left_out: whole.paths.entries.len() - packed.paths.entries.len(),
+        kinds: kinds(&kind_bytes(whole), &kind_bytes(packed)),
+        ..PackReport::default()
+    }
+}
+
+fn kinds(
+    before: &BTreeMap<OperatorKind, KindBytes>,
+    after: &BTreeMap<OperatorKind, KindBytes>,
+) -> Vec<KindReport> {
+    let kind = |kind: OperatorKind| {
         let bytes_before = before.get(&kind)?.bytes;
         let after = after.get(&kind);
         Some(KindReport {
@@ -163,18 +168,8 @@ fn report(
             bytes: after.map_or(0, |entry| entry.bytes),
             storage: after.map_or("", |entry| entry.storage),
         })
-    });
-    PackReport {
-        file: args.out.display().to_string(),
-        shapes: names(true),
-        shapes_left_out: names(false),
-        variants: packed.variants.len(),
-        paths: packed.paths.entries.len(),
-        paths_left_out: whole.paths.entries.len() - packed.paths.entries.len(),
-        kinds: kinds.collect(),
-        file_bytes_before,
-        file_bytes,
-    }
+    };
+    OperatorKind::ALL.into_iter().filter_map(kind).collect()
 }
 
 fn print(report: &PackReport) {

@@ -1,4 +1,4 @@
-//! Reading and writing a level's file.
+//! A level as a file.
 
 use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_runtime::low_level::level::text::MAX_TEXT_BYTES;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Why a level's file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LevelFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("level {}: {source}", path.display())]
     Read {
         /// Which file.
@@ -17,7 +17,7 @@ pub enum LevelFileError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// It holds no sound level.
+    /// The file holds no sound level, or the level has no form as text.
     #[error("level {}: {source}", path.display())]
     Level {
         /// Which file.
@@ -25,7 +25,7 @@ pub enum LevelFileError {
         /// What is wrong.
         source: LevelTextError,
     },
-    /// It cannot be written.
+    /// The file cannot be written.
     #[error(transparent)]
     Write(#[from] ContainerError),
 }
@@ -42,7 +42,7 @@ pub fn read_level(path: &Path) -> Result<Level, LevelFileError> {
     let mut bytes = Vec::new();
     std::fs::File::open(path)
         .map_err(io)?
-        // One byte more than a level may have tells too long from just fitting.
+        // One byte more than a level may have tells a text that is too long from one that just fits.
         .take(MAX_TEXT_BYTES as u64 + 1)
         .read_to_end(&mut bytes)
         .map_err(io)?;

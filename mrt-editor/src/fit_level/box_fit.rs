@@ -9,10 +9,10 @@ use mrt_runtime::blocks::{Block, Shape};
 /// Share of the area that may lie outside on each side of each axis.
 const OUTLIER_SHARE: f64 = 0.005;
 
-/// If the whole mesh is at most this much longer than the box without outliers, nothing is one.
+/// If the whole mesh is at most this many times as long as the box without outliers, the box holds all of it.
 const WHOLE_STRETCH: f64 = 1.1;
 
-/// The box, given points spread evenly over the mesh's area.
+/// One block of a shape around points that are spread evenly over the mesh's area.
 pub fn fit_box(shape: &'static Shape, points: &[Vec3]) -> Level {
     let mut min = DVec3::ZERO;
     let mut max = DVec3::ZERO;

@@ -1,6 +1,6 @@
 //! Turns cells into joined blocks whose common corners take common heights.
 
-use super::cells::{Cell, Cells, GridLines, Passage, side_corners};
+use super::cell::{Cell, Cells, GridLines, SharedSide, side_corners};
 use super::voxels::FreeSpace;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
@@ -27,14 +27,14 @@ pub struct GridLevel {
     pub crumbs: usize,
     /// Cells too flat, folded or in one another's way.
     pub misfits: usize,
-    /// Passages closed because the cells on both sides could not be brought to one height.
+    /// Shared sides that were closed because the cells could not be brought to one height.
     pub closed_passages: usize,
 }
 
 /// Sides whose heights share less than this are not joined: one block would be squeezed flat.
 const LEAST_OVERLAP: f64 = 0.08;
 
-/// Share of a side that has to be open to the outside for the block to be.
+/// A block is open to the outside at sides of which at least this share is.
 const LEAST_OUTSIDE: f64 = 0.6;
 
 /// Joins the cells.
@@ -55,15 +55,15 @@ pub fn join_cells(
     });
     let mut is_kept = vec![true; cells.cells.len()];
     let crumbs = drop_crumbs(cells, config, &mut is_kept);
-    let mut open: Vec<Passage> = cells
-        .passages
+    let mut open: Vec<SharedSide> = cells
+        .sides
         .iter()
         .copied()
         .filter(|p| p.openness >= config.openness && p.overlap >= LEAST_OVERLAP)
         .filter(|p| is_kept[p.low] && is_kept[p.high])
         .collect();
     let (mut misfits, mut closed_passages) = (0, 0);
-    // One passage or one cell a round goes, so this ends.
+    // Each round closes a side or drops a cell, so this ends.
     loop {
         let kept: Vec<usize> = (0..cells.cells.len())
             .filter(|&cell| is_kept[cell])
@@ -102,7 +102,7 @@ pub fn join_cells(
     }
 }
 
-/// A line's coordinate: the middle one of the surfaces that stand across it within half a voxel.
+/// A line's coordinate: the median of the surfaces that cross the links between the voxels on both sides of it.
 fn snap(space: &FreeSpace, axis: usize, line: usize) -> f64 {
     let grid = &space.grid;
     let world_axis = 2 * axis;
@@ -130,15 +130,12 @@ fn snap(space: &FreeSpace, axis: usize, line: usize) -> f64 {
         .map_or(boundary, |&cut| f64::from(cut))
 }
 
-/// Forgets the cells of groups that are too small; returns how many.
+/// Drops the cells of groups that are too small; returns how many.
 fn drop_crumbs(cells: &Cells, config: &JoinConfig, is_kept: &mut [bool]) -> usize {
     let mut groups = Groups::new(cells.cells.len());
-    for passage in cells
-        .passages
-        .iter()
-        .filter(|p| p.openness >= config.openness)
-    {
-        groups.unite(passage.low, passage.high);
+    let sides = cells.sides.iter();
+    for side in sides.filter(|side| side.openness >= config.openness) {
+        groups.unite(side.low, side.high);
     }
     let mut volume = vec![0; cells.cells.len()];
     for (cell, found) in cells.cells.iter().enumerate() {
@@ -157,22 +154,22 @@ fn drop_crumbs(cells: &Cells, config: &JoinConfig, is_kept: &mut [bool]) -> usiz
     crumbs
 }
 
-/// The hexahedron of each cell. Corners of cells joined around one grid point take a mean of their
-/// heights, so that joined sides coincide to the last bit; sides lie in upright planes along the
-/// lines, so that cells of different columns cannot overlap.
-fn warps(cells: &[Cell], open: &[Passage], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexahedron> {
+/// The hexahedron of each cell. Corners of cells joined around one grid point take a mean of their heights, so that joined
+/// sides coincide to the last bit. Sides lie in upright planes along the lines, so that cells of different columns cannot
+/// overlap.
+fn warps(cells: &[Cell], open: &[SharedSide], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexahedron> {
     let mut groups = Groups::new(4 * cells.len());
-    for passage in open {
-        let low = side_corners(passage.axis, true);
-        let high = side_corners(passage.axis, false);
+    for side in open {
+        let low = side_corners(side.axis, true);
+        let high = side_corners(side.axis, false);
         for (l, h) in low.into_iter().zip(high) {
-            groups.unite(4 * passage.low + l, 4 * passage.high + h);
+            groups.unite(4 * side.low + l, 4 * side.high + h);
         }
     }
     let mut sums = vec![[0.0; 3]; 4 * cells.len()];
     for (cell, found) in cells.iter().enumerate() {
         for k in 0..4 {
-            // Where a corridor leads into a hall, the opening is the corridor's: low sides decide.
+            // Low sides weigh more: where a corridor leads into a hall, the opening is as high as the corridor.
             let height = (found.ceiling[k] - found.floor[k]).max(1e-6);
             let weight = 1.0 / height;
             let sum = &mut sums[groups.find(4 * cell + k)];
@@ -203,8 +200,8 @@ fn warps(cells: &[Cell], open: &[Passage], [xs, zs]: &[Vec<f64>; 2]) -> Vec<Hexa
         .collect()
 }
 
-/// Puts a level plane between storeys whose ceiling and floor were drawn into one another by their
-/// neighbours. Ceilings only sink and floors only rise, so that what was apart stays apart.
+/// Puts a level plane between storeys whose ceiling and floor were drawn into one another by their neighbours. Ceilings only
+/// sink and floors only rise, so storeys that were apart stay apart.
 fn separate_storeys(cells: &[Cell], groups: &mut Groups, heights: &mut [[f64; 2]]) {
     for (lower, pair) in cells.windows(2).enumerate() {
         // Cells of one column stand next to each other, lowest first.
@@ -237,20 +234,25 @@ fn separate_storeys(cells: &[Cell], groups: &mut Groups, heights: &mut [[f64; 2]
     }
 }
 
-fn assemble_level(cells: &[Cell], kept: &[usize], open: &[Passage], warps: &[Hexahedron]) -> Level {
+fn assemble_level(
+    cells: &[Cell],
+    kept: &[usize],
+    open: &[SharedSide],
+    warps: &[Hexahedron],
+) -> Level {
     let mut block_of_cell = vec![usize::MAX; warps.len()];
     for (block, &cell) in kept.iter().enumerate() {
         block_of_cell[cell] = block;
     }
     let mut faces: Vec<Vec<Face>> = vec![Vec::new(); kept.len()];
     let mut connections = Vec::new();
-    for passage in open {
-        let axis = 2 * passage.axis;
+    for side in open {
+        let axis = 2 * side.axis;
         let end = |cell: usize, positive: bool| Opening {
             block: block_of_cell[cell],
             face: Face::from_axis(axis, positive),
         };
-        let (a, b) = (end(passage.low, true), end(passage.high, false));
+        let (a, b) = (end(side.low, true), end(side.high, false));
         faces[a.block].push(a.face);
         faces[b.block].push(b.face);
         connections.push(Connection { a, b });

@@ -1,11 +1,12 @@
 //! Where to cut the free space: unequally spaced grid lines that follow the walls.
 //!
-//! First the lines are placed, per axis, by dynamic programming: a line earns the wall area it
-//! stands at and pays for gaps that differ from the cell size asked for. Then lines across which
-//! the cells agree are taken out again, the least needed first.
+//! First the lines are placed, axis by axis, by dynamic programming: a line earns the wall area that it stands at and pays
+//! for gaps that differ from the cell size asked for. Then lines across which the cells agree are taken out again, the
+//! least needed first.
 
-use super::cells::{Cell, Cells, GridLines, cut_into_cells};
-use super::columns::Columns;
+use super::cell::{Cell, Cells, GridLines};
+use super::column_runs::ColumnRuns;
+use super::cut::cut_into_cells;
 use super::voxels::FreeSpace;
 use std::ops::Range;
 
@@ -16,23 +17,22 @@ pub struct LineConfig {
     pub cell: f64,
     /// Lines are taken out until at most this many cells are left.
     pub max_cells: usize,
-    /// Lines whose sides disagree by less than this are taken out, as long as gaps stay below
-    /// [`WIDEST_GAP`].
+    /// Lines whose sides disagree by less than this are taken out, as long as gaps stay below [`WIDEST_GAP`].
     pub tolerance: f64,
 }
 
 /// Narrowest gap, in cells.
 const NARROWEST_GAP: f64 = 0.5;
 
-/// Widest gap that lines are placed with or taken out for, in cells: transport in a box stretched
-/// 1:1.5 errs by 15 %, at 1:2 by 25 %.
+/// Widest gap that placing or taking out lines may leave, in cells: transport in a box stretched 1:1.5 errs by 15 %, in one
+/// of 1:2 by 25 %.
 pub const WIDEST_GAP: f64 = 1.6;
 
-/// What a gap twice as wide as asked for costs, in shares of a line with walls all along.
+/// What a gap twice as wide as asked for costs, in what the line with the most walls earns.
 const STRETCH_COST: f64 = 0.4;
 
 /// Chooses lines for both axes and takes out the unneeded ones.
-pub fn choose_lines(space: &FreeSpace, columns: &Columns, config: &LineConfig) -> GridLines {
+pub fn choose_lines(space: &FreeSpace, columns: &ColumnRuns, config: &LineConfig) -> GridLines {
     let mut lines = GridLines {
         lines: std::array::from_fn(|axis| place_lines(space, columns, axis, config.cell)),
     };
@@ -47,13 +47,13 @@ pub fn choose_lines(space: &FreeSpace, columns: &Columns, config: &LineConfig) -
 }
 
 /// The columns that have runs, along one axis.
-fn occupied(columns: &Columns, axis: usize) -> Range<usize> {
+fn occupied(columns: &ColumnRuns, axis: usize) -> Range<usize> {
     let used = || columns.runs.iter().map(|run| run.column[axis]);
     used().min().unwrap_or(0)..used().max().map_or(1, |last| last + 1)
 }
 
 /// The best set of lines along one axis.
-fn place_lines(space: &FreeSpace, columns: &Columns, axis: usize, cell: f64) -> Vec<usize> {
+fn place_lines(space: &FreeSpace, columns: &ColumnRuns, axis: usize, cell: f64) -> Vec<usize> {
     let range = occupied(columns, axis);
     let wall = wall_area(space, columns, axis);
     let strongest = wall[range.start..=range.end]
@@ -98,8 +98,8 @@ fn place_lines(space: &FreeSpace, columns: &Columns, axis: usize, cell: f64) -> 
     lines
 }
 
-/// Per voxel boundary along the axis: sides of free voxels that something stands against.
-fn wall_area(space: &FreeSpace, columns: &Columns, axis: usize) -> Vec<f64> {
+/// For each voxel boundary along the axis, the number of sides of free voxels that something stands against.
+fn wall_area(space: &FreeSpace, columns: &ColumnRuns, axis: usize) -> Vec<f64> {
     let mut wall = vec![0.0; columns.count[axis] + 1];
     let world_axis = 2 * axis;
     let stride = space.grid.stride(world_axis);
@@ -118,7 +118,8 @@ fn wall_area(space: &FreeSpace, columns: &Columns, axis: usize) -> Vec<f64> {
     wall
 }
 
-/// The inner line whose removal changes least; `None` when all are needed.
+/// Axis and position of the inner line whose removal changes least; `None` when all are needed. `is_over` if there are too
+/// many cells.
 fn least_needed(
     space: &FreeSpace,
     cells: &Cells,
@@ -139,7 +140,7 @@ fn least_needed(
             if !is_over && (is_stretched || change > config.tolerance) {
                 continue;
             }
-            // Forced removals prefer lines that leave no stretched gap.
+            // Where lines must go, those that leave no stretched gap go first.
             let cost = change + (gap / (WIDEST_GAP * config.cell)).max(1.0) - 1.0;
             if best.is_none_or(|(least, _, _)| cost < least) {
                 best = Some((cost, axis, position));
@@ -149,8 +150,8 @@ fn least_needed(
     best.map(|(_, axis, position)| (axis, position))
 }
 
-/// Per line: the share of the sides along it at which the cells on both sides are not one room with
-/// one floor and one ceiling.
+/// For each line, the share of the sides along it at which the cells on both sides are not one room with one floor and one
+/// ceiling.
 fn disagreements(cells: &Cells, lines: &GridLines, axis: usize) -> Vec<f64> {
     let mut agreed = vec![0.0; lines.lines[axis].len()];
     let mut total = vec![0.0; lines.lines[axis].len()];
@@ -163,10 +164,10 @@ fn disagreements(cells: &Cells, lines: &GridLines, axis: usize) -> Vec<f64> {
         total[position] += side_area(cell);
         total[position + 1] += side_area(cell);
     }
-    for passage in cells.passages.iter().filter(|p| p.axis == axis) {
-        let (low, high) = (&cells.cells[passage.low], &cells.cells[passage.high]);
+    for side in cells.sides.iter().filter(|side| side.axis == axis) {
+        let (low, high) = (&cells.cells[side.low], &cells.cells[side.high]);
         let area = side_area(low) + side_area(high);
-        agreed[high.column[axis]] += area * passage.openness * likeness(low, high);
+        agreed[high.column[axis]] += area * side.openness * likeness(low, high);
     }
     (0..total.len())
         .map(|line| {
@@ -179,7 +180,7 @@ fn disagreements(cells: &Cells, lines: &GridLines, axis: usize) -> Vec<f64> {
         .collect()
 }
 
-/// 1 for cells of the same floor and ceiling, 0 when they differ by half their height.
+/// 1 for cells of the same floor and ceiling; 0 if floor and ceiling together differ by the height of the lower cell.
 fn likeness(a: &Cell, b: &Cell) -> f64 {
     let mean = |heights: &[f64; 4]| heights.iter().sum::<f64>() / 4.0;
     let (floor, ceiling) = (

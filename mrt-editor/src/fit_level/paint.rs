@@ -1,15 +1,15 @@
 //! Gives every wall of a level the mean albedo of the surfaces that receive their light from it.
 
-use super::surface::SurfacePoint;
-use crate::receiver::ReceiverMap;
+use super::mesh_samples::MeshSample;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_runtime::Level;
+use mrt_runtime::low_level::output::receiver::ReceiverMap;
 use serde::Serialize;
 
-/// A point is near a block within this share of the block's diagonal: walls of real rooms have niches,
-/// and blocks are coarse.
+/// A point is near a block within this share of the block's diagonal: walls of real rooms have niches, and blocks are
+/// coarse.
 const NEAR: f64 = 0.1;
 
 /// Shares of the mesh's area.
@@ -21,13 +21,13 @@ pub struct Coverage {
     pub near: f64,
 }
 
-/// Measures how much of the mesh the level holds.
-pub fn coverage(level: &Level, receivers: &ReceiverMap, points: &[SurfacePoint]) -> Coverage {
+/// Measures how much of the mesh the level holds, from samples of it.
+pub fn coverage(level: &Level, receivers: &ReceiverMap, points: &[MeshSample]) -> Coverage {
     let (mut inside, mut near, mut total) = (0.0, 0.0, 0.0);
     for point in points {
         total += point.area;
         let distance = distance_in_blocks(level, receivers, point);
-        // Rounding puts a wall's own surface a hair outside.
+        // Rounding may put a wall's own surface a little outside.
         inside += if distance <= 1e-3 { point.area } else { 0.0 };
         near += if distance <= NEAR { point.area } else { 0.0 };
     }
@@ -40,17 +40,17 @@ pub fn coverage(level: &Level, receivers: &ReceiverMap, points: &[SurfacePoint])
     }
 }
 
-/// Distance from the nearest block in diagonals of it.
-fn distance_in_blocks(level: &Level, receivers: &ReceiverMap, point: &SurfacePoint) -> f64 {
+/// Distance from the nearest block, in diagonals of that block.
+fn distance_in_blocks(level: &Level, receivers: &ReceiverMap, point: &MeshSample) -> f64 {
     receivers
         .nearest_block(point.position)
         .map_or(f64::INFINITY, |(block, distance)| {
-            distance / level.blocks[block].warp.diagonal()
+            distance / level.blocks[block.get()].warp.diagonal()
         })
 }
 
 /// Paints the walls and measures how much of the mesh the level holds.
-pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoint]) -> Coverage {
+pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[MeshSample]) -> Coverage {
     let receivers = ReceiverMap::new(level);
     let covered = coverage(level, &receivers, points);
     let mut walls = vec![[(DVec3::ZERO, 0.0); 6]; level.blocks.len()];
@@ -58,10 +58,12 @@ pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoin
         if distance_in_blocks(level, &receivers, point) > NEAR {
             continue;
         }
-        if let Some(receiver) = receivers.receiver(point.position, point.normal) {
+        if let Some(receiver) = receivers.receiver(point.position, point.normal)
+            && let Some(face) = receivers.turned_face(&receiver)
+        {
             let material = mesh.triangle_materials[point.triangle] as usize;
             let albedo = mesh.materials[material].albedo.as_dvec3();
-            let (sum, area) = &mut walls[receiver.block][receivers.turned_face(&receiver).index()];
+            let (sum, area) = &mut walls[receiver.block.get()][face.index()];
             *sum += albedo * point.area;
             *area += point.area;
         }
@@ -80,7 +82,7 @@ pub fn paint_level(level: &mut Level, mesh: &TriangleMesh, points: &[SurfacePoin
     covered
 }
 
-/// The mean over areas, `None` without any; kept in [0, 1] against rounding.
+/// The mean albedo of sums over areas; `None` without area. Clamped to [0, 1], which rounding could leave.
 fn mean<'a>(sums: impl Iterator<Item = &'a (DVec3, f64)>) -> Option<Vec3> {
     let (sum, area) = sums.fold((DVec3::ZERO, 0.0), |(sum, area), (s, a)| {
         (sum + s, area + a)

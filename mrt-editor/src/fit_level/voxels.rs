@@ -1,15 +1,15 @@
 //! Free space as voxels: which points of a regular grid stand inside the level's rooms.
 //!
-//! Level meshes are open, their faces meet in T-junctions, and solid rock is whatever lies behind the
-//! faces; counting crossings of a ray (odd means inside) fails on all of that. Instead every triangle
-//! is projected along the three axes onto the rows of voxel centres, which lists all crossings of every
-//! row with the side they are seen from. A voxel is free when it sees fronts of faces around it and
-//! stands above one; neighbours are linked when no triangle crosses the line between their centres.
+//! Level meshes are open, their faces meet in T-junctions, and solid rock is whatever lies behind the faces; counting
+//! crossings of a ray (odd means inside) fails on all of that. Instead every triangle is projected along the three axes
+//! onto the rows of voxel centres, which lists all crossings of every row with the side from which they are seen. A voxel
+//! is free when it sees fronts of faces around it and stands above one. Neighbours are linked when no triangle crosses the
+//! line between their centres.
 
 use glam::{DVec3, Vec3};
 
-/// Rows that triangles may cross along one axis, all together. Levels have a few million; a pile of
-/// triangles as large as the scene would fill the memory.
+/// Tests of a triangle against a row of voxels along one axis, at most. Levels have a few million; a pile of triangles as
+/// large as the scene would fill the memory.
 pub const MOST_CROSSINGS: usize = 100_000_000;
 
 /// A regular grid of cubes.
@@ -32,7 +32,7 @@ pub enum Winding {
     Front,
     /// Clockwise seen from the room.
     Back,
-    /// Both sides: faces have no direction.
+    /// Both sides face rooms.
     Both,
 }
 
@@ -43,8 +43,8 @@ pub struct FreeSpace {
     pub grid: VoxelGrid,
     /// True inside rooms.
     pub free: Vec<bool>,
-    /// Per axis and voxel: the coordinate at which a triangle cuts the line to the next voxel along
-    /// the axis, NaN when none does.
+    /// By axis and voxel: the coordinate at which a triangle cuts the line to the next voxel along the axis, NaN when none
+    /// does.
     pub cut: [Vec<f32>; 3],
     /// Height of the next surface below each voxel, -infinity when there is none.
     pub floor: Vec<f32>,
@@ -66,8 +66,8 @@ impl VoxelGrid {
     /// A grid around `min`..`max` with one voxel to spare on each side.
     pub fn around(min: Vec3, max: Vec3, edge: f64) -> Self {
         let size = (max - min).as_dvec3();
-        // An odd fraction of a voxel: modelled planes lie on round numbers, and a row inside a plane
-        // sees nothing of it.
+        // An odd fraction of a voxel: modelled planes lie on round numbers, and a row that runs inside a plane does not
+        // cross it.
         let start = min.as_dvec3() - DVec3::new(1.317, 1.273, 1.351) * edge;
         Self {
             min: start,
@@ -145,7 +145,7 @@ pub fn find_free_space(
         Winding::Auto => {
             let (front, back): (_, Vec<bool>) = (front(), back());
             let volume = |free: &[bool]| free.iter().filter(|&&free| free).count();
-            // Solid rock between rooms is seen from behind and can be several times the rooms' size.
+            // Solid rock between rooms sees the backs of faces and can be several times the rooms' size.
             space.is_reversed = volume(&front) * 20 < volume(&back);
             if space.is_reversed { back } else { front }
         }
@@ -166,7 +166,7 @@ struct Sight {
 }
 
 impl Sight {
-    /// A floor below and walls on most sides; sky above or one open side is still a room.
+    /// A room has a floor below and walls on most sides; it may be open to the sky or to one side.
     fn is_free(&self) -> bool {
         self.below_is_front && self.fronts >= self.backs + 3
     }
@@ -198,12 +198,13 @@ impl Sight {
     }
 }
 
-/// The row's axes: the two that are not `axis`, in an order that keeps handedness.
+/// The two axes across `axis`, in an order that keeps handedness.
 fn plane_axes(axis: usize) -> [usize; 2] {
     [(axis + 1) % 3, (axis + 2) % 3]
 }
 
-/// Projects every triangle along `axis`; rows are indexed a + b * count[a] over the plane's axes.
+/// Projects every triangle along `axis`, and lists its crossings by row, with index `i + j * count[a]` for position i and j
+/// along the two axes a and b across. `None` above [`MOST_CROSSINGS`].
 fn crossings_by_row(
     triangles: &[[Vec3; 3]],
     grid: &VoxelGrid,
@@ -309,8 +310,8 @@ fn scan_rows(rows: &[Vec<Crossing>], axis: usize, space: &mut FreeSpace, sight: 
     }
 }
 
-/// Frees voxels that most linked neighbours are free around, and the reverse: lone faults come from
-/// faces modelled from one side only.
+/// Frees voxels most of whose linked neighbours are free, and fills those with hardly any: lone faults come from faces that
+/// are modelled from one side only.
 fn smooth(space: &mut FreeSpace) {
     let grid = space.grid.clone();
     let before = space.free.clone();

@@ -13,11 +13,11 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Looks from one point to another, +Y upwards; the angle of view is vertical. `None` when the
-    /// points coincide or are not finite.
+    /// Looks from one point to another, +Y upwards, metres; the angle of view is vertical, and `aspect` is width over
+    /// height. `None` if the points coincide or are not finite.
     pub fn look_at(from: Vec3, to: Vec3, view_angle_rad: f32, aspect: f32) -> Option<Self> {
         let forward = (to - from).try_normalize().filter(|f| f.is_finite())?;
-        // Straight up or down any direction may be to the right.
+        // When the camera looks straight up or down, any horizontal direction may be to the right.
         let right = forward.cross(Vec3::Y).try_normalize().unwrap_or(Vec3::X);
         let half = (view_angle_rad / 2.0).tan();
         Some(Self {
@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn up_is_up_and_right_is_right() {
+    fn the_top_of_the_picture_is_up_and_its_right_side_to_the_right() {
         let camera = Camera::look_at(Vec3::ZERO, Vec3::NEG_Z, 1.0, 1.0).expect("looks");
         assert!(camera.direction(0.5, 0.0).y > 0.4);
         assert!(camera.direction(1.0, 0.5).x > 0.4);

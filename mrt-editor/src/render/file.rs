@@ -1,6 +1,6 @@
 //! Pictures as files, which are there whole or not at all.
 
-use super::Picture;
+use super::picture::Picture;
 use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -29,6 +29,17 @@ pub enum WriteError {
         /// What the encoder says.
         source: image::ImageError,
     },
+}
+
+/// Makes a folder, and those that it is in.
+///
+/// # Errors
+/// [`WriteError::Io`].
+pub fn make_folder(path: &Path) -> Result<(), WriteError> {
+    std::fs::create_dir_all(path).map_err(|source| WriteError::Io {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 /// What the encoder of a PNG file saves.

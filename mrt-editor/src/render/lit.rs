@@ -1,35 +1,34 @@
 //! Colours of a mesh under sphere lights, with indirect light from a lightmap.
 
-use crate::receiver::{Blend, ReceiverMap};
 use glam::Vec3;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
-use mrt_runtime::BlockIndex;
 use mrt_runtime::low_level::output::lightmap_atlas::LightmapAtlas;
+use mrt_runtime::low_level::output::receiver::{Blend, ReceiverMap};
 use std::f32::consts::PI;
 
-/// Shadow rays to each light that are always cast.
+/// Shadow rays that are always cast to a lamp.
 const FIRST_SHADOW_RAYS: u32 = 2;
 
-/// Shadow rays where the first disagree.
+/// Shadow rays to a lamp where the first disagree.
 const SHADOW_RAYS: u32 = 16;
 
-/// Lights below this share of all light at a point, were there no shadows, are left out.
+/// Lamps below this share of all light that a point would get without shadows are left out.
 const NEGLIGIBLE_SHARE: f32 = 2e-3;
 
-/// A sphere light; irradiance is `intensity cos θ / max(d², radius²)`.
+/// A light that shines from a sphere; irradiance is `intensity cos θ / max(d², radius²)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SphereLight {
+pub struct Lamp {
     /// Centre, metres.
     pub position: Vec3,
-    /// Metres.
+    /// Radius, metres.
     pub radius: f32,
     /// Radiant intensity per colour channel, W/sr.
     pub intensity: Vec3,
 }
 
-/// Everything a ray needs to find its colour.
+/// Everything that a ray needs to find its colour.
 #[derive(Clone, Copy)]
 pub struct LitScene<'a> {
     /// The mesh.
@@ -44,12 +43,12 @@ pub struct LitScene<'a> {
     pub atlas: &'a LightmapAtlas,
     /// Indirect irradiance, W/m².
     pub lightmap: &'a [[f32; 3]],
-    /// Lights, for the direct part.
-    pub lights: &'a [SphereLight],
-    /// Length that rays start off surfaces, metres.
+    /// What direct light comes from.
+    pub lamps: &'a [Lamp],
+    /// Distance from surfaces at which rays start, metres.
     pub restart: f32,
-    /// For views from outside: surfaces are invisible from behind and where no light of the level gets
-    /// to, such as roofs, so that one looks into the rooms.
+    /// For views from outside: surfaces are invisible from behind, and where no light of the level gets to, such as roofs,
+    /// so that one looks into the rooms.
     pub hides_outside: bool,
 }
 
@@ -72,7 +71,7 @@ struct Surface {
 }
 
 impl LitScene<'_> {
-    /// The radiance that comes back along a ray with a unit direction; none where it hits nothing.
+    /// The radiance that comes back along a ray with a unit direction; black where the ray hits nothing.
     pub fn colours(&self, origin: Vec3, direction: Vec3) -> Colours {
         let Some(surface) = self.surface(origin, direction) else {
             return Colours::default();
@@ -85,7 +84,7 @@ impl LitScene<'_> {
     }
 
     fn surface(&self, mut origin: Vec3, direction: Vec3) -> Option<Surface> {
-        // Few surfaces lie behind one another; the bound is against rays along a stack of them.
+        // Few surfaces lie behind one another; the bound stops rays along a stack of them.
         for _ in 0..64 {
             let hit = self.bvh.closest_hit(origin, direction, f32::INFINITY)?;
             let triangle = hit.triangle as usize;
@@ -113,43 +112,41 @@ impl LitScene<'_> {
 
     fn is_outside(&self, position: Vec3, normal: Vec3) -> bool {
         let blend = self.receivers.blended(position, normal, |_| false);
-        let lit: f64 = blend.parts().iter().map(|(_, weight)| weight).sum();
-        lit < 0.5
+        blend.total_weight() < 0.5
     }
 
-    /// Irradiance straight from the lights, with soft shadows.
+    /// Irradiance straight from the lamps, with soft shadows.
     fn direct(&self, surface: &Surface) -> Vec3 {
         let seed = hash(surface.position.x.to_bits(), surface.position.z.to_bits());
-        let unshadowed = |light: &SphereLight| {
-            let offset = light.position - surface.position;
-            let squared = offset.length_squared().max(light.radius * light.radius);
+        let unshadowed = |lamp: &Lamp| {
+            let offset = lamp.position - surface.position;
+            let squared = offset.length_squared().max(lamp.radius * lamp.radius);
             let cosine = surface.normal.dot(offset.normalize_or_zero());
             if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
                 return Vec3::ZERO;
             }
-            light.intensity * (cosine / squared)
+            lamp.intensity * (cosine / squared)
         };
-        let most: Vec3 = self.lights.iter().map(unshadowed).sum();
+        let most: Vec3 = self.lamps.iter().map(unshadowed).sum();
         let mut sum = Vec3::ZERO;
-        for light in self.lights {
-            let irradiance = unshadowed(light);
-            // Not worth a ray.
+        for lamp in self.lamps {
+            let irradiance = unshadowed(lamp);
             if irradiance.cmple(most * NEGLIGIBLE_SHARE).all() {
                 continue;
             }
-            sum += irradiance * self.visible_share(surface, light, seed);
+            sum += irradiance * self.visible_share(surface, lamp, seed);
         }
         sum
     }
 
-    /// Share of a light that is seen: a few rays where they agree, more in penumbras.
-    fn visible_share(&self, surface: &Surface, light: &SphereLight, seed: u32) -> f32 {
-        let distance = light.position.distance(surface.position);
+    /// The share of a lamp that is seen: by a few rays where they agree, by more in penumbras.
+    fn visible_share(&self, surface: &Surface, lamp: &Lamp, seed: u32) -> f32 {
+        let distance = lamp.position.distance(surface.position);
         let start = surface.position + surface.flat_normal * self.restart.min(1e-2 * distance);
         let is_visible = |k: u32| {
             let square = square_from_unit(sobol_point(k, seed));
-            let on_light = sphere_from_square(square).as_vec3() * light.radius;
-            let towards = light.position + on_light - start;
+            let on_lamp = sphere_from_square(square).as_vec3() * lamp.radius;
+            let towards = lamp.position + on_lamp - start;
             u32::from(!self.bvh.is_occluded(start, towards, 1.0))
         };
         let first: u32 = (0..FIRST_SHADOW_RAYS).map(is_visible).sum();
@@ -168,18 +165,18 @@ impl LitScene<'_> {
             })
     }
 
-    /// Irradiance from the lightmap: one wall would do, but curved surfaces would show where it changes.
+    /// Irradiance from the lightmap, of several walls: with one, curved surfaces would show where it changes.
     fn indirect(&self, surface: &Surface) -> Vec3 {
         self.blend(surface)
             .parts()
             .iter()
-            .filter_map(|(receiver, weight)| {
-                let (u, v) = (receiver.u as f32, receiver.v as f32);
-                let pixel =
-                    self.atlas
-                        .pixel(BlockIndex::new(receiver.block), receiver.face, u, v)?;
+            .filter_map(|part| {
+                let at = part.receiver;
+                let pixel = self
+                    .atlas
+                    .pixel(at.block, at.face, at.u as f32, at.v as f32)?;
                 let irradiance = self.atlas.sample(self.lightmap, pixel);
-                Some(Vec3::from_array(irradiance) * *weight as f32)
+                Some(Vec3::from_array(irradiance) * part.weight as f32)
             })
             .sum()
     }

@@ -3,13 +3,14 @@
 use super::camera::Camera;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::bvh::Bvh;
+use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::geometry::mesh::{TriangleMesh, bounds};
 use mrt_core::lighting::sampling::{hammersley_point, sphere_from_square, square_from_unit};
 use mrt_runtime::Level;
 use mrt_runtime::blocks::Block;
 use std::f32::consts::TAU;
 
-/// Vertical angle of view.
+/// Vertical angle of view, radians.
 pub const VIEW_ANGLE_RAD: f32 = 1.05;
 
 /// Rays across and down a trial picture.
@@ -26,23 +27,23 @@ pub struct Surroundings<'a> {
     pub mesh: &'a TriangleMesh,
     /// Its tree.
     pub bvh: &'a Bvh,
-    /// Rooms see the backs of the faces.
+    /// True if rooms see the backs of the faces.
     pub is_reversed: bool,
 }
 
-/// What a look around from a point meets.
+/// What rays in all directions from a point meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct View {
+pub struct Outlook {
     /// Share of the directions that meet a face turned to the point.
     pub fronts: f32,
-    /// Share that meets a face turned away.
+    /// Share of the directions that meet a face turned away.
     pub backs: f32,
-    /// Smallest distance met, metres.
+    /// Distance to the nearest face met, metres; infinite if there is none.
     pub clearance: f32,
 }
 
 impl<'a> Surroundings<'a> {
-    /// Asks the blocks' centres which side of the faces is inside.
+    /// Finds out which side of the faces is inside, from what the blocks' centres see.
     pub fn new(mesh: &'a TriangleMesh, bvh: &'a Bvh, level: &Level) -> Self {
         let mut surroundings = Self {
             mesh,
@@ -60,10 +61,10 @@ impl<'a> Surroundings<'a> {
     }
 
     /// Looks in all directions.
-    pub fn look_around(&self, point: Vec3) -> View {
-        let mut view = View {
+    pub fn look_around(&self, point: Vec3) -> Outlook {
+        let mut outlook = Outlook {
             clearance: f32::INFINITY,
-            ..View::default()
+            ..Outlook::default()
         };
         for k in 0..LOOKS {
             let square = square_from_unit(hammersley_point(k, LOOKS));
@@ -71,20 +72,20 @@ impl<'a> Surroundings<'a> {
             let Some(hit) = self.bvh.closest_hit(point, direction, f32::INFINITY) else {
                 continue;
             };
-            view.clearance = view.clearance.min(hit.t);
+            outlook.clearance = outlook.clearance.min(hit.t);
             let [a, b, c] = self.mesh.corners(hit.triangle as usize);
             let is_front = (b - a).cross(c - a).dot(direction) < 0.0;
             let share = 1.0 / LOOKS as f32;
             if is_front != self.is_reversed {
-                view.fronts += share;
+                outlook.fronts += share;
             } else {
-                view.backs += share;
+                outlook.backs += share;
             }
         }
-        view
+        outlook
     }
 
-    /// Length to start rays off surfaces: a thousandth of what a person would call near.
+    /// Distance from surfaces at which to start rays, metres: 1e-5 of the mesh's size.
     pub fn restart(&self) -> f32 {
         1e-5 * size(self.mesh)
     }
@@ -95,7 +96,7 @@ impl<'a> Surroundings<'a> {
         view.backs > view.fronts
     }
 
-    /// The free distance from a point, at most `limit`.
+    /// The free distance from a point along a direction, at most `limit`.
     fn distance(&self, point: Vec3, direction: Vec3, limit: f32) -> f32 {
         self.bvh
             .closest_hit(point, direction, limit)
@@ -103,22 +104,31 @@ impl<'a> Surroundings<'a> {
     }
 }
 
+/// A place for a light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPlace {
+    /// Which block it is in.
+    pub block: usize,
+    /// Metres.
+    pub position: Vec3,
+}
+
 /// Places for up to `count` lights: high up in the largest blocks, apart from one another.
-pub fn light_places(around: &Surroundings<'_>, level: &Level, count: usize) -> Vec<(usize, Vec3)> {
+pub fn light_places(around: &Surroundings<'_>, level: &Level, count: usize) -> Vec<LightPlace> {
     let mut order: Vec<usize> = (0..level.blocks.len()).collect();
     let volume = |block: usize| volume(&level.blocks[block]);
     order.sort_by(|&a, &b| volume(b).total_cmp(&volume(a)));
-    let mut places: Vec<(usize, Vec3)> = Vec::new();
+    let mut places: Vec<LightPlace> = Vec::new();
     for block in order {
-        let Some(place) = place_in_block(around, &level.blocks[block]) else {
+        let Some(position) = place_in_block(around, &level.blocks[block]) else {
             continue;
         };
         let apart = 2.5 * level.blocks[block].warp.diagonal() as f32;
         if places
             .iter()
-            .all(|(_, other)| other.distance(place) > apart)
+            .all(|other| other.position.distance(position) > apart)
         {
-            places.push((block, place));
+            places.push(LightPlace { block, position });
         }
         if places.len() == count {
             break;
@@ -127,12 +137,17 @@ pub fn light_places(around: &Surroundings<'_>, level: &Level, count: usize) -> V
     places
 }
 
+/// Edge of the cube with nearly the block's volume, metres: that of the map's derivative in the middle.
+pub fn block_width(warp: &Hexahedron) -> f64 {
+    warp.jacobian(DVec3::splat(0.5)).determinant().abs().cbrt()
+}
+
+/// Nearly the block's volume, m³; negative if the block is mirrored.
 fn volume(block: &Block) -> f64 {
     block.warp.jacobian(DVec3::splat(0.5)).determinant()
 }
 
-/// The place in the block that is furthest from every surface, out of a few; `None` when all are in
-/// walls.
+/// Of a few places in the block the one that is furthest from every surface; `None` if all are in walls.
 fn place_in_block(around: &Surroundings<'_>, block: &Block) -> Option<Vec3> {
     let mut best: Option<(f32, Vec3)> = None;
     for y in [0.72, 0.5, 0.3] {
@@ -140,7 +155,7 @@ fn place_in_block(around: &Surroundings<'_>, block: &Block) -> Option<Vec3> {
             for z in [0.5, 0.35, 0.65] {
                 let place = block.warp.point(DVec3::new(x, y, z)).as_vec3();
                 let view = around.look_around(place);
-                // Open sides are fine, a view of backs is not.
+                // A room may have open sides, but shows hardly any backs.
                 let is_inside = view.fronts > 4.0 * view.backs && view.clearance.is_finite();
                 if is_inside && best.is_none_or(|(clearance, _)| view.clearance > 1.3 * clearance) {
                     best = Some((view.clearance, place));
@@ -151,8 +166,8 @@ fn place_in_block(around: &Surroundings<'_>, block: &Block) -> Option<Vec3> {
     best.map(|(_, place)| place)
 }
 
-/// A camera that shows what a light lights: of many places around it the one whose picture has most
-/// lit surfaces and edges. `None` when the light lights nothing.
+/// A camera that shows what a light lights: of many places around the light the one whose picture has most lit surfaces
+/// and edges. `None` if the light lights nothing.
 pub fn camera_at_light(around: &Surroundings<'_>, light: Vec3, aspect: f32) -> Option<Camera> {
     let limit = size(around.mesh);
     let below = around.distance(light, Vec3::NEG_Y, limit);
@@ -167,7 +182,7 @@ pub fn camera_at_light(around: &Surroundings<'_>, light: Vec3, aspect: f32) -> O
             let back = around.distance(eye, -ahead, limit);
             let forward = around.distance(eye, ahead, limit);
             for share in [0.4, 0.85] {
-                // Standing outside and looking in is fine, but not from afar.
+                // The camera may stand outside and look in, but not from afar.
                 let from = eye - ahead * (share * back).min(1.5 * forward);
                 let to = eye + ahead * forward - Vec3::Y * 0.15 * (forward + back).min(below);
                 let Some(camera) = Camera::look_at(from, to, VIEW_ANGLE_RAD, aspect) else {
@@ -190,8 +205,8 @@ struct Glimpse {
     normal: Vec3,
 }
 
-/// How much there is to see: lit surfaces, and edges between surfaces; little of the outside and of
-/// things right before the camera. Zero inside a wall.
+/// How much a picture shows: lit surfaces and edges between surfaces count; the outside, and things right before the
+/// camera, count little. Zero inside a wall.
 fn interest(around: &Surroundings<'_>, camera: &Camera, light: Vec3) -> f32 {
     let near = 0.4 * camera.position.distance(light);
     let (mut lit, mut far) = (0.0, 0.0);
@@ -231,7 +246,7 @@ fn interest(around: &Surroundings<'_>, camera: &Camera, light: Vec3) -> f32 {
         .map(|k| f32::from(is_edge(k, k + 1)) + f32::from(is_edge(k, k + TRIAL_COLUMNS)))
         .sum::<f32>();
     let count = glimpses.len() as f32;
-    // Half lit and a quarter of edges is a full picture; more is no better.
+    // More lit surfaces than half of the picture, or more edges than half of the rays, make it no better.
     (lit / count).min(0.5) * (edges / count).min(0.5) * (far / count).powi(3)
 }
 
@@ -242,9 +257,9 @@ pub fn overview(level: &Level, aspect: f32) -> Option<Camera> {
     let high = corners().fold(DVec3::MIN, DVec3::max).as_vec3();
     let center = (low + high) / 2.0;
     let angle = 40f32.to_radians();
-    // The whole bounding sphere would leave much empty; levels are flat.
+    // Levels are flat: to show the whole bounding sphere would leave much of the picture empty.
     let reach = ((high - low).length() / 2.0) / (angle / 2.0).tan() * 0.75;
-    // Levels are longer one way; look across the longer.
+    // Most levels are longer along one axis; the camera looks across that.
     let size = high - low;
     let side = if size.x >= size.z { Vec3::Z } else { Vec3::X };
     let direction = (side + Vec3::Y * 1.4).normalize();

@@ -1,12 +1,12 @@
 //! From linear colours to what a screen shows.
 
-use super::Picture;
+use super::picture::Picture;
 use glam::Vec3;
 
-/// Luminance that auto exposure brings the picture's middle to.
+/// Luminance that auto exposure gives the median pixel.
 const MIDDLE_GREY: f32 = 0.2;
 
-/// Auto exposure lets at most this share of the pixels run into white.
+/// Auto exposure lets at most this share of the pixels become white.
 const WHITE_SHARE: f64 = 0.02;
 
 /// Relative luminance of linear RGB with sRGB's primaries.
@@ -17,8 +17,8 @@ pub fn luminance(colour: Vec3) -> f32 {
 /// Pixels darker than this share of the brightest count as unlit.
 const UNLIT_SHARE: f32 = 0.01;
 
-/// The factor that exposes a picture well: its middle becomes a middle grey, unless too much of it
-/// would turn white. Unlit pixels do not count; 1 for a picture without light.
+/// The factor that exposes pictures well: the median pixel becomes a middle grey, unless too many pixels would then be
+/// white. Unlit pixels do not count. 1 for pictures without light.
 pub fn auto_exposure(pictures: &[&Picture]) -> f32 {
     let mut lit: Vec<f32> = pictures
         .iter()
@@ -33,12 +33,12 @@ pub fn auto_exposure(pictures: &[&Picture]) -> f32 {
     let at = |values: &[f32], share: f64| values[((values.len() - 1) as f64 * share) as usize];
     let bright = at(&lit, 1.0 - WHITE_SHARE);
     let dark = lit.partition_point(|&value| value < UNLIT_SHARE * bright);
-    // A value of 2 is nearly white behind the shoulder of the curve.
+    // The curve takes a value of 2 to nearly white.
     let exposure = (MIDDLE_GREY / at(&lit[dark..], 0.5)).min(2.0 / bright);
     exposure.clamp(1e-20, 1e20)
 }
 
-/// Scales by the exposure, rolls highlights off and encodes as 8-bit sRGB.
+/// Scales by the exposure, compresses highlights and encodes as 8-bit sRGB, three bytes a pixel.
 pub fn tone_map(picture: &Picture, exposure: f32) -> Vec<u8> {
     picture
         .pixels
@@ -55,7 +55,7 @@ fn roll_off(x: f32) -> f32 {
     if !x.is_finite() {
         return 1.0;
     }
-    // Beyond this the curve is flat, and squares stay finite.
+    // The curve is flat beyond this, and squares stay finite.
     let x = x.min(1e3);
     (x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)).min(1.0)
 }

@@ -41,6 +41,7 @@ use crate::output::lightmap::Lightmap;
 use crate::output::probe_order::PROBE_COEFFICIENTS;
 use crate::output::probes::{Probes, irradiance_from_probe};
 use glam::Vec3;
+use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::hemisphere_sh::evaluate_f32;
 use std::num::NonZero;
 
@@ -220,9 +221,11 @@ impl Frame {
         Some(self.surface.emission.get(slot))
     }
 
-    /// Replaces the scene, such as by the same level with blocks added or removed. Lights and their ids stay. For each
-    /// block of the new scene, `old_block` may name the same block in the present scene; if both have the same shape,
-    /// its indirect light stays. All other blocks start dark. Doors and colours are those of the new level.
+    /// Replaces the scene, for example by the same level with blocks added or removed. Lights and their ids stay.
+    ///
+    /// For each block of the new scene, `old_block` may name the same block in the present scene. Its indirect light
+    /// then stays on the walls that both have: a cube that gains or loses an opening keeps the light of its other
+    /// walls; a tube must keep its shape. All other walls start dark. Doors and colours are those of the new level.
     ///
     /// Allocates the buffers of the new scene.
     pub fn change_scene(
@@ -233,34 +236,51 @@ impl Frame {
         let mut next = Frame::new(scene, self.config.clone());
         std::mem::swap(&mut next.lights, &mut self.lights);
         next.lights.place_in(&scene.level);
-        let (from, to) = (&self.scene, scene);
-        for (block, placed) in to.level.blocks.iter().enumerate() {
-            let block = BlockIndex::new(block);
-            let old = old_block(block).filter(|old| {
-                let old = from.level.block(*old);
-                old.is_some_and(|old| {
-                    old.shape == placed.shape && old.texels.len() == placed.texels.len()
-                })
-            });
-            let Some(old) = old else { continue };
-            let rank = to.layout.rank[block.get()];
-            let texel_of_slot = &to.layout.texel_of_slot[to.layout.shape(rank)];
-            for (slot, &texel) in to.layout.slots(rank).zip(texel_of_slot) {
-                if let Some(shown) = from.layout.slot(old, texel as usize) {
-                    let irradiance = self.light.indirect.get(shown);
-                    next.light.indirect.set(slot, irradiance);
-                }
-            }
-            let old = &self.schedule.state[from.layout.rank[old.get()].get()];
-            if old.has_indirect {
-                next.schedule.state[rank.get()].has_indirect = true;
-                next.schedule.touch(rank, f32::INFINITY);
-                // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their
-                // turn.
-                next.schedule.mark_changed(rank);
+        for block in (0..scene.level.blocks.len()).map(BlockIndex::new) {
+            if let Some(old) = old_block(block) {
+                next.take_indirect(block, self, old);
             }
         }
         *self = next;
+    }
+
+    /// Takes the indirect light of a block from a block of another frame, at the walls that both have.
+    fn take_indirect(&mut self, block: BlockIndex, from: &Frame, old: BlockIndex) {
+        let (level, old_level) = (&self.scene.level, &from.scene.level);
+        let (Some(placed), Some(old_placed)) = (level.block(block), old_level.block(old)) else {
+            return;
+        };
+        let old_state = &from.schedule.state[from.scene.layout.rank[old.get()].get()];
+        if placed.shape.form != old_placed.shape.form
+            || level.resolution != old_level.resolution
+            || !old_state.has_indirect
+        {
+            return;
+        }
+        let mut old_texel = vec![None; placed.texels.len()];
+        for face in Face::ALL {
+            for row in 0..level.resolution {
+                for column in 0..level.resolution {
+                    if let Some(texel) = level.level_texel(block, face, row, column) {
+                        old_texel[texel] = old_level.level_texel(old, face, row, column);
+                    }
+                }
+            }
+        }
+        let layout = &self.scene.layout;
+        let rank = layout.rank[block.get()];
+        let texel_of_slot = &layout.texel_of_slot[layout.shape(rank)];
+        for (slot, &texel) in layout.slots(rank).zip(texel_of_slot) {
+            let texel = old_texel.get(texel as usize).copied().flatten();
+            if let Some(shown) = texel.and_then(|texel| from.scene.layout.slot(old, texel)) {
+                let irradiance = from.light.indirect.get(shown);
+                self.light.indirect.set(slot, irradiance);
+            }
+        }
+        self.schedule.state[rank.get()].has_indirect = true;
+        self.schedule.touch(rank, f32::INFINITY);
+        // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their turn.
+        self.schedule.mark_changed(rank);
     }
 }
 

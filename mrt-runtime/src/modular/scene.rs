@@ -6,6 +6,7 @@ use crate::modular::packed::{PackedShape, PackedTransport};
 use crate::output::lightmap_atlas::LightmapAtlas;
 use crate::output::texel_layout::{BlockRank, TexelGeometry, TexelLayout};
 use glam::{DMat3, Vec3};
+use mrt_core::geometry::cube::Face;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -23,6 +24,18 @@ impl Scene {
     /// True if both share their data: one is a clone of the other.
     pub fn is_same(&self, other: &Scene) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// Texels along an edge of a wall.
+    pub fn resolution(&self) -> usize {
+        self.level.resolution
+    }
+
+    /// Index within a block of the texel at (row along v, column along u) of a face of the turned cube, as
+    /// [`Frame::indirect_at`](crate::modular::frame::Frame::indirect_at) takes it; `None` for openings, and for blocks
+    /// and texels that do not exist.
+    pub fn texel(&self, block: BlockIndex, face: Face, row: usize, column: usize) -> Option<usize> {
+        self.level.level_texel(block, face, row, column)
     }
 }
 

@@ -1,27 +1,32 @@
-//! What a game relies on in the facade of the runtime: light ids, reports, tiles, queries and scenes that change.
+//! What a game relies on in the facade of the runtime: ids of lights, reports, tiles, queries, and scenes that change.
 
-use glam::{Vec2, Vec3, vec3};
+use glam::{DVec3, Vec2, Vec3, vec3};
+use mrt_core::storage::f16;
 use mrt_runtime::blocks::Shape;
 use mrt_runtime::{
     BlockIndex, Bounces, Frame, FrameConfig, FrameReport, Level, Light, LightError, Outputs,
     ProbeOrder, Scene, Tile,
 };
-use mrt_tests::{FrameForTests, assembled, floor_plan, sphere};
+use mrt_tests::{
+    FrameForTests, Random, assembled, corridor, floor_plan, mobile, random_level,
+    relative_difference, with_outputs,
+};
 use std::collections::BTreeSet;
 
-fn corridor(blocks: i32) -> Level {
-    let cells: Vec<[i32; 2]> = (0..blocks).map(|x| [x, 0]).collect();
-    floor_plan(&cells, 0.5)
+fn scene_of_corridor(blocks: i32) -> Scene {
+    assembled(&floor_plan(&corridor(blocks), 0.5))
 }
 
 fn lamp(x: f32) -> Light {
-    sphere(vec3(x, 0.6, 0.4), 0.1, Vec3::ONE)
+    Light::sphere(vec3(x, 0.6, 0.4), 0.1, Vec3::ONE)
 }
 
-fn nowhere() -> Light {
-    sphere(vec3(0.5, 5.0, 0.5), 0.1, Vec3::ONE)
+/// A light outside all blocks.
+fn outside() -> Light {
+    Light::sphere(vec3(0.5, 5.0, 0.5), 0.1, Vec3::ONE)
 }
 
+/// A new frame with one bounce and without feedback.
 fn one_bounce(scene: &Scene) -> Frame {
     let config = FrameConfig {
         bounces: Bounces::Count(1),
@@ -31,20 +36,20 @@ fn one_bounce(scene: &Scene) -> Frame {
 }
 
 #[test]
-fn scenes_and_frames_go_from_thread_to_thread() {
+fn scenes_and_reports_are_shared_between_threads_and_frames_are_sent() {
     fn shared<T: Send + Sync>() {}
     fn sent<T: Send>() {}
     shared::<Scene>();
     shared::<FrameReport>();
     sent::<Frame>();
-    let scene = assembled(&corridor(2));
+    let scene = scene_of_corridor(2);
     assert!(scene.is_same(&scene.clone()));
-    assert!(!scene.is_same(&assembled(&corridor(2))));
+    assert!(!scene.is_same(&scene_of_corridor(2)));
 }
 
 #[test]
 fn removing_a_light_disturbs_no_other() {
-    // Two corridors without a connection: what one lamp does, no other lamp's blocks see.
+    // Two corridors that are not connected, each with a lamp.
     let cells: Vec<[i32; 3]> = [0, 1, 2, 9, 10, 11].map(|x| [x, 0, 0]).to_vec();
     let level = Level::from_cells(&cells, Vec3::splat(0.5)).expect("cells in rows");
     let scene = assembled(&level);
@@ -59,7 +64,7 @@ fn removing_a_light_disturbs_no_other() {
     let after = frame.indirect();
     assert!(after[..left].iter().all(|&e| e == 0.0));
     assert!(after[left..right] == before[left..right]);
-    // The id of a light that was removed names no light ever after.
+    // The id of a removed light never names another light.
     let third = frame.add_light(lamp(1.5));
     assert_eq!(frame.light(first), None);
     assert!(!frame.set_light(first, lamp(2.5)) && frame.remove_light(first).is_none());
@@ -70,13 +75,13 @@ fn removing_a_light_disturbs_no_other() {
 
 #[test]
 fn a_torch_that_clips_a_wall_is_skipped_and_comes_back() {
-    let scene = assembled(&corridor(3));
+    let scene = scene_of_corridor(3);
     let mut frame = one_bounce(&scene);
     let torch = frame.add_light(lamp(0.5));
     let other = frame.add_light(lamp(2.5));
     frame.solve();
     let both = frame.indirect();
-    frame.set_light(torch, nowhere());
+    frame.set_light(torch, outside());
     let report = frame.solve();
     let [skipped] = report.skipped_lights() else {
         panic!("{:?}", report.skipped_lights());
@@ -89,7 +94,7 @@ fn a_torch_that_clips_a_wall_is_skipped_and_comes_back() {
     alone.solve();
     assert!(
         frame.indirect() == alone.indirect(),
-        "the other still shines"
+        "the other lamp still shines"
     );
     frame.set_light(torch, lamp(0.5));
     assert_eq!(frame.solve().skipped_lights(), []);
@@ -97,12 +102,12 @@ fn a_torch_that_clips_a_wall_is_skipped_and_comes_back() {
     assert!(frame.light(other).is_some());
 }
 
-/// A report outlives the next frame, which then makes a new one.
+/// A report stays as it is when the frame is solved again.
 #[test]
 fn reports_are_snapshots() {
-    let scene = assembled(&corridor(2));
+    let scene = scene_of_corridor(2);
     let mut frame = one_bounce(&scene);
-    let torch = frame.add_light(nowhere());
+    let torch = frame.add_light(outside());
     let first = frame.solve();
     frame.set_light(torch, lamp(0.5));
     let second = frame.solve();
@@ -111,10 +116,9 @@ fn reports_are_snapshots() {
     assert!(first.changed_tiles().len() == 0 && second.changed_tiles().len() > 0);
 }
 
-/// The pixels that a report says changed are all that changed.
 #[test]
-fn changed_tiles_are_all_that_changed() {
-    let scene = assembled(&corridor(12));
+fn all_pixels_that_changed_are_in_changed_tiles() {
+    let scene = scene_of_corridor(12);
     let mut frame = one_bounce(&scene);
     let torch = frame.add_light(lamp(0.3));
     let mut mirror = vec![[0.0f32; 3]; frame.lightmap().pixels().len()];
@@ -143,8 +147,8 @@ fn changed_tiles_are_all_that_changed() {
 }
 
 #[test]
-fn tiles_come_as_textures_take_them() {
-    let scene = assembled(&corridor(2));
+fn tiles_are_written_in_the_formats_of_textures() {
+    let scene = scene_of_corridor(2);
     let mut frame = one_bounce(&scene);
     frame.add_light(lamp(0.5));
     let report = frame.solve();
@@ -160,8 +164,8 @@ fn tiles_come_as_textures_take_them() {
             let most = exact.into_iter().fold(0.0, f32::max);
             let step = f32::from_bits(((shared >> 27) + 127 - 24) << 23);
             for channel in 0..3 {
-                let of_half = f16_to_f32(half[channel]);
-                // Eleven significant bits, halves below 2^-14 aside.
+                let of_half = f16::from_bits(half[channel]).to_f32();
+                // Halves have eleven significant bits, and fewer below 2^-14.
                 assert!((of_half - exact[channel]).abs() <= exact[channel] / 2048.0 + 3e-8);
                 let mantissa = (shared >> (9 * channel)) & 511;
                 assert!((mantissa as f32 * step - exact[channel]).abs() <= most / 511.0 + 3e-8);
@@ -179,18 +183,9 @@ fn tiles_come_as_textures_take_them() {
     assert!(halves.is_empty() && shared.is_empty());
 }
 
-/// For positive numbers.
-fn f16_to_f32(bits: u16) -> f32 {
-    let (exponent, mantissa) = (i32::from(bits >> 10), f32::from(bits & 1023));
-    match exponent {
-        0 => mantissa * 2f32.powi(-24),
-        _ => (1.0 + mantissa / 1024.0) * 2f32.powi(exponent - 15),
-    }
-}
-
 #[test]
 fn queries_beyond_the_level_are_none() {
-    let scene = assembled(&corridor(2));
+    let scene = scene_of_corridor(2);
     let mut frame = one_bounce(&scene);
     frame.add_light(lamp(0.5));
     frame.solve();
@@ -209,18 +204,14 @@ fn queries_beyond_the_level_are_none() {
         assert_eq!(frame.vector_at(block, texel, Vec3::Z), None);
         assert!(frame.set_texel_albedo(beyond, &[Vec3::ONE]).is_err());
     }
-    // No probes were asked for.
+    // The frame was not asked for probes.
     assert_eq!(frame.irradiance_at(vec3(0.5, 0.5, 0.5), Vec3::Y), None);
     let outputs = Outputs {
         lightmap: false,
         probes: Some(ProbeOrder::L1),
         vector: true,
     };
-    let config = FrameConfig {
-        outputs,
-        ..FrameConfig::default()
-    };
-    let mut frame = Frame::new(&scene, config);
+    let mut frame = with_outputs(&scene, outputs);
     frame.add_light(lamp(0.5));
     let report = frame.solve();
     assert_eq!(report.changed_tiles().len(), 0);
@@ -233,11 +224,8 @@ fn queries_beyond_the_level_are_none() {
     }
 }
 
-/// The block of a point is the one that a look at every block finds.
 #[test]
-fn the_block_of_a_point_is_found_as_by_looking_at_all() {
-    use mrt_tests::Random;
-    use mrt_tests::sequences::{mobile, random_level};
+fn the_block_of_a_point_is_that_of_a_search_through_all_blocks() {
     for seed in 0..12 {
         let mut random = Random(seed);
         let scene = mobile(&random_level(&mut random, 40));
@@ -247,7 +235,7 @@ fn the_block_of_a_point_is_found_as_by_looking_at_all() {
             .expect("blocks");
         let mut inside = 0;
         for _ in 0..2000 {
-            let unit = glam::DVec3::new(random.unit(), random.unit(), random.unit());
+            let unit = DVec3::new(random.unit(), random.unit(), random.unit());
             let point = low - 0.1 + (high - low + 0.2) * unit;
             let contains = |slack: f64| {
                 scene.level.blocks.iter().position(|block| {
@@ -266,10 +254,10 @@ fn the_block_of_a_point_is_found_as_by_looking_at_all() {
     }
 }
 
-/// Blocks that are added and removed leave the light of the others, which feedback then brings up to date.
+/// When blocks are added or removed, other blocks keep their light, and feedback brings it up to date.
 #[test]
 fn light_goes_on_in_a_scene_with_other_blocks() {
-    let (short, long) = (assembled(&corridor(5)), assembled(&corridor(6)));
+    let (short, long) = (scene_of_corridor(5), scene_of_corridor(6));
     let mut frame = Frame::new(&short, FrameConfig::default());
     let torch = frame.add_light(lamp(2.5));
     for _ in 0..200 {
@@ -287,7 +275,7 @@ fn light_goes_on_in_a_scene_with_other_blocks() {
     let sum = |light: &[f32]| light.iter().sum::<f32>();
     for step in 0..3 {
         assert_eq!(frame.solve().skipped_lights(), []);
-        // Nothing goes dark on the way: the end of the corridor sends back a few percent of the light there.
+        // No block becomes dark meanwhile. The end of the corridor sends back a few percent of this light.
         let now = sum(&middle(&frame)) / sum(&before);
         assert!((0.9..1.1).contains(&now), "frame {step}: {now}");
     }
@@ -299,23 +287,20 @@ fn light_goes_on_in_a_scene_with_other_blocks() {
     for _ in 0..200 {
         fresh.solve();
     }
-    // Both have converged but for rounding.
+    // Both have converged up to rounding.
     let (now, expected) = (middle(&frame), middle(&fresh));
-    let largest = expected.iter().fold(0.0f32, |m, &e| m.max(e));
-    for (a, b) in now.iter().zip(&expected) {
-        assert!((a - b).abs() < 1e-5 * largest);
-    }
-    // And back again, to a scene that the torch is outside of.
-    frame.change_scene(&assembled(&corridor(2)), |_| None);
+    assert!(relative_difference(&now, &expected) < 1e-5);
+    // And back again, to a scene in which the torch is outside all blocks.
+    frame.change_scene(&scene_of_corridor(2), |_| None);
     let report = frame.solve();
     assert_eq!(report.skipped_lights().len(), 1);
     assert!(frame.indirect().iter().all(|&e| e == 0.0));
 }
 
-/// Colours that change go on from the light before, and come to what a frame shows that had them from the start.
+/// When colours change, light continues from the light before. It converges to that of a frame which always had them.
 #[test]
 fn colours_change_without_a_flash() {
-    let scene = assembled(&corridor(4));
+    let scene = scene_of_corridor(4);
     let mut frame = Frame::new(&scene, FrameConfig::default());
     frame.add_light(lamp(1.5));
     for _ in 0..100 {

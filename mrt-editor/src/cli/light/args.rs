@@ -1,6 +1,6 @@
 //! Flags of `mrt light`.
 
-use crate::cli::map::ImportArgs;
+use crate::cli::import_args::ImportArgs;
 use glam::Vec3;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -57,7 +57,7 @@ pub struct LightArgs {
     pub json: bool,
 }
 
-/// `None` is all.
+/// Number of bounces; `None` is all.
 pub type BounceLimit = Option<u32>;
 
 /// Width and height, pixels.
@@ -86,9 +86,9 @@ pub struct ViewArg {
 /// How bright the pictures are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
-    /// From what the picture shows.
+    /// Chosen from what the picture shows.
     Auto,
-    /// Stops.
+    /// Stops: each doubles the brightness.
     Value(f32),
 }
 
@@ -97,7 +97,7 @@ pub enum Exposure {
 pub enum Shadows {
     /// The walls of the blocks.
     Openings,
-    /// Rays into the mesh.
+    /// The mesh, by rays.
     Rays,
 }
 

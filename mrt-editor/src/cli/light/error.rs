@@ -1,6 +1,8 @@
 //! Why `mrt light` stops.
 
 use crate::cli::dictionary_source::SourceError;
+use crate::cli::import_args::import_hint;
+use crate::cli::output::ReportError;
 use crate::document::level_file::LevelFileError;
 use crate::import::error::ImportError;
 use crate::render::file::WriteError;
@@ -19,7 +21,7 @@ pub enum LightCommandError {
         /// The input in it.
         input: PathBuf,
     },
-    /// Mesh and level do not lie in the same place.
+    /// The mesh does not lie where the level is.
     #[error(
         "level {}: {:.1} % of the mesh's area lies in or near a block; expected at least {:.0} % (is it this \
          mesh's level, and are --scale and --up those of `mrt map`?)",
@@ -28,14 +30,18 @@ pub enum LightCommandError {
     OtherMesh {
         /// The level file.
         path: PathBuf,
-        /// Smallest share accepted.
+        /// Smallest share of the mesh's area accepted.
         expected: f64,
-        /// Share of the area.
+        /// Share of the mesh's area in or near a block.
         found: f64,
     },
     /// The mesh cannot be read.
-    #[error(transparent)]
-    Import(#[from] ImportError),
+    #[error("{source}{}", import_hint(source))]
+    Import {
+        /// Why.
+        #[from]
+        source: ImportError,
+    },
     /// The level's file is at fault.
     #[error(transparent)]
     Level(#[from] LevelFileError),
@@ -56,11 +62,11 @@ pub enum LightCommandError {
     OutsideBlocks {
         /// Which light.
         light: usize,
-        /// Its position.
+        /// Its position, metres.
         position: Vec3,
         /// The nearest block.
         block: usize,
-        /// Metres to it.
+        /// Metres to the block.
         distance: f64,
     },
     /// A light is behind the mesh's faces.
@@ -73,10 +79,10 @@ pub enum LightCommandError {
         light: usize,
         /// Its position.
         position: Vec3,
-        /// Share of directions, percent.
+        /// Directions in which it sees the backs of faces, percent.
         backs: f32,
     },
-    /// Nowhere to put the default light.
+    /// There is no place for the default light.
     #[error(
         "no light was given and none of the level's blocks has free space at its centre; expected \
          --light x,y,z,intensity"
@@ -93,4 +99,7 @@ pub enum LightCommandError {
     /// The files cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The report has no form as JSON.
+    #[error(transparent)]
+    Report(#[from] ReportError),
 }

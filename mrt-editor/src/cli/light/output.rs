@@ -1,44 +1,40 @@
 //! The files that `mrt light` leaves: all of them, or none.
 
-use super::View;
-use crate::receiver::unwrap::LitTriangle;
-use crate::render::Picture;
-use crate::render::file::{Saves, WriteError, write_hdr, write_png};
+use super::view::View;
+use crate::render::file::{Saves, WriteError, make_folder, write_hdr, write_png};
 use crate::render::lit::LitScene;
+use crate::render::picture::Picture;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::Vec3;
 use mrt_core::container::write_file_atomically;
-use mrt_runtime::BlockIndex;
+use mrt_runtime::low_level::output::receiver::UnwrappedTriangle;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes into a folder of its own beside `folder` first, and moves the files once all are there.
+/// Writes into a temporary folder beside `folder` first, and moves the files once all are there.
 pub(super) fn write(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[LitTriangle],
+    unwrapped: &[UnwrappedTriangle],
 ) -> Result<(), WriteError> {
     let mut name = folder.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.part", std::process::id()));
     let part = folder.with_file_name(name);
-    let io = |path: &Path| {
-        let path = path.to_owned();
-        move |source| WriteError::Io { path, source }
-    };
     let write = || {
-        std::fs::create_dir_all(&part).map_err(io(&part))?;
+        make_folder(&part)?;
         let files = write_files(&part, views, lit, unwrapped)?;
-        std::fs::create_dir_all(folder).map_err(io(folder))?;
+        make_folder(folder)?;
         for file in files {
-            let target = folder.join(&file);
-            std::fs::rename(part.join(&file), &target).map_err(io(&target))?;
+            let path = folder.join(&file);
+            let moved = std::fs::rename(part.join(&file), &path);
+            moved.map_err(|source| WriteError::Io { path, source })?;
         }
         Ok(())
     };
     let result = write();
-    // Empty by now, or not wanted; the result says whether all went well.
+    // It is empty by now, or its files are not wanted; the result says whether all went well.
     let _ = std::fs::remove_dir_all(&part);
     result
 }
@@ -47,7 +43,7 @@ fn write_files(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[LitTriangle],
+    unwrapped: &[UnwrappedTriangle],
 ) -> Result<Vec<PathBuf>, WriteError> {
     let mut files = Vec::new();
     let mut name = |file: String| {
@@ -78,73 +74,74 @@ fn write_files(
 }
 
 /// The mesh with coordinates into the lightmap; v runs upwards, as is usual in OBJ.
-fn obj_text(lit: &LitScene<'_>, unwrapped: &[LitTriangle]) -> String {
+fn obj_text(lit: &LitScene<'_>, unwrapped: &[UnwrappedTriangle]) -> String {
     let mut text = String::from("mtllib mesh.mtl\n");
-    let mut positions = HashMap::new();
-    let mut coordinates = HashMap::new();
+    let mut positions = Numbered::default();
+    let mut coordinates = Numbered::default();
     let mut faces = String::new();
     let mut last_material = None;
     for triangle in unwrapped {
         let material = lit.mesh.triangle_materials[triangle.source];
         if last_material != Some(material) {
             last_material = Some(material);
-            line(
-                &mut faces,
-                format_args!("usemtl {}", material_name(lit, material)),
-            );
+            let name = material_name(lit, material);
+            line(&mut faces, format_args!("usemtl {name}"));
         }
-        let mut indices = [(0, 0); 3];
-        for (k, (corner, receiver)) in triangle.corners.iter().zip(&triangle.receivers).enumerate()
-        {
-            let next = positions.len() + 1;
-            let position = *positions
-                .entry(corner.to_array().map(f32::to_bits))
-                .or_insert_with(|| {
-                    line(
-                        &mut text,
-                        format_args!("v {} {} {}", corner.x, corner.y, corner.z),
-                    );
-                    next
+        let corners = triangle.corners.iter().zip(&triangle.receivers);
+        let indices: Vec<String> = corners
+            .map(|(corner, at)| {
+                let [x, y, z] = corner.to_array();
+                let position = positions.number([x, y, z], || {
+                    line(&mut text, format_args!("v {x} {y} {z}"));
                 });
-            let (u, v) = (receiver.u as f32, receiver.v as f32);
-            let uv = lit
-                .atlas
-                .texture_coordinate(BlockIndex::new(receiver.block), receiver.face, u, v)
-                .unwrap_or_default();
-            let next = coordinates.len() + 1;
-            let coordinate = *coordinates
-                .entry(uv.to_array().map(f32::to_bits))
-                .or_insert_with(|| {
-                    line(&mut text, format_args!("vt {} {}", uv.x, 1.0 - uv.y));
-                    next
+                let (u, v) = (at.u as f32, at.v as f32);
+                let uv = lit.atlas.texture_coordinate(at.block, at.face, u, v);
+                let [u, v] = uv.unwrap_or_default().to_array();
+                let coordinate = coordinates.number([u, v], || {
+                    line(&mut text, format_args!("vt {u} {}", 1.0 - v));
                 });
-            indices[k] = (position, coordinate);
-        }
-        let [a, b, c] = indices;
-        line(
-            &mut faces,
-            format_args!("f {}/{} {}/{} {}/{}", a.0, a.1, b.0, b.1, c.0, c.1),
-        );
+                format!("{position}/{coordinate}")
+            })
+            .collect();
+        line(&mut faces, format_args!("f {}", indices.join(" ")));
     }
     text + &faces
+}
+
+/// Points that have been written, by the bits of their coordinates.
+struct Numbered<const N: usize>(HashMap<[u32; N], usize>);
+
+impl<const N: usize> Default for Numbered<N> {
+    fn default() -> Self {
+        Self(HashMap::new())
+    }
+}
+
+impl<const N: usize> Numbered<N> {
+    /// The number of a point, counted from 1; a new one is written first.
+    fn number(&mut self, point: [f32; N], write: impl FnOnce()) -> usize {
+        let next = self.0.len() + 1;
+        *self.0.entry(point.map(f32::to_bits)).or_insert_with(|| {
+            write();
+            next
+        })
+    }
 }
 
 fn mtl_text(lit: &LitScene<'_>) -> String {
     let mut text = String::new();
     for (index, material) in lit.mesh.materials.iter().enumerate() {
         let [r, g, b] = material.albedo.to_array();
-        line(
-            &mut text,
-            format_args!("newmtl {}", material_name(lit, index as u32)),
-        );
+        let name = material_name(lit, index as u32);
+        line(&mut text, format_args!("newmtl {name}"));
         line(&mut text, format_args!("Kd {r} {g} {b}"));
-        // The indirect light, for a viewer to multiply the colour with.
+        // A viewer multiplies the colour by the indirect light.
         line(&mut text, format_args!("map_Kd lightmap.png\n"));
     }
     text
 }
 
-/// Names from files may hold blanks, or nothing at all.
+/// A name without blanks that no other material has: names from files may hold blanks, or be empty.
 fn material_name(lit: &LitScene<'_>, material: u32) -> String {
     let name = &lit.mesh.materials[material as usize].name;
     let plain: String = name

@@ -1,10 +1,9 @@
 //! What `mrt light` prints.
 
-use super::View;
+use crate::cli::import_args::print_import;
+use crate::cli::output::print_row;
 use crate::import::report::ImportReport;
-use crate::render::Picture;
-use crate::render::lit::SphereLight;
-use crate::render::tone::luminance;
+use crate::render::lit::Lamp;
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -12,11 +11,13 @@ pub(super) struct Report {
     pub(super) mesh: ImportReport,
     pub(super) blocks: usize,
     pub(super) connections: usize,
+    /// Rows of [`lamp_row`].
     pub(super) lights: Vec<[f32; 8]>,
     pub(super) passes: u32,
     pub(super) dictionary_seconds: f64,
     pub(super) assemble_seconds: f64,
     pub(super) frame_milliseconds: f64,
+    /// Pixels across and down.
     pub(super) lightmap: [usize; 2],
     pub(super) lightmap_triangles: usize,
     pub(super) views: Vec<ViewReport>,
@@ -27,51 +28,36 @@ pub(super) struct Report {
 pub(super) struct ViewReport {
     pub(super) name: String,
     pub(super) exposure_ev: f32,
-    /// Means over the picture of relative luminance.
+    /// Mean over the picture of the relative luminance by direct light.
     pub(super) direct: f32,
+    /// The same by indirect light.
     pub(super) indirect: f32,
 }
 
 /// Position, radius, strongest channel and intensity.
-pub(super) fn light_row(light: &SphereLight) -> [f32; 8] {
-    let [x, y, z] = light.position.to_array();
-    let [r, g, b] = light.intensity.to_array();
-    let strongest = light.intensity.max_element();
-    [x, y, z, light.radius, strongest, r, g, b]
-}
-
-impl View {
-    pub(super) fn report(&self) -> ViewReport {
-        let mean = |picture: &Picture| {
-            let sum: f32 = picture.pixels.iter().map(|&colour| luminance(colour)).sum();
-            sum / picture.pixels.len() as f32
-        };
-        ViewReport {
-            name: self.name.clone(),
-            exposure_ev: self.exposure.log2(),
-            direct: mean(&self.pictures[0]),
-            indirect: mean(&self.pictures[1]),
-        }
-    }
+pub(super) fn lamp_row(lamp: &Lamp) -> [f32; 8] {
+    let [x, y, z] = lamp.position.to_array();
+    let [r, g, b] = lamp.intensity.to_array();
+    let strongest = lamp.intensity.max_element();
+    [x, y, z, lamp.radius, strongest, r, g, b]
 }
 
 impl Report {
     pub(super) fn print(&self) {
-        self.mesh.print();
-        let row = |name: &str, value: String| crate::report_line!("{name:<22} {value}");
-        row("blocks", self.blocks.to_string());
-        row("connections", self.connections.to_string());
+        print_import(&self.mesh);
+        print_row("blocks", self.blocks);
+        print_row("connections", self.connections);
         for [x, y, z, radius, _, r, g, b] in &self.lights {
-            row(
+            print_row(
                 "light",
                 format!(
                     "({x:.3}, {y:.3}, {z:.3}) m, radius {radius:.3} m, ({r:.3}, {g:.3}, {b:.3}) W/sr"
                 ),
             );
         }
-        row("dictionary", format!("{:.2} s", self.dictionary_seconds));
-        row("assembly", format!("{:.2} s", self.assemble_seconds));
-        row(
+        print_row("dictionary", format!("{:.2} s", self.dictionary_seconds));
+        print_row("assembly", format!("{:.2} s", self.assemble_seconds));
+        print_row(
             "frame",
             format!(
                 "{:.2} ms with direct light, {} passes",
@@ -79,12 +65,12 @@ impl Report {
             ),
         );
         let [width, height] = self.lightmap;
-        row(
+        print_row(
             "lightmap",
             format!("{width} x {height}, {} triangles", self.lightmap_triangles),
         );
         for view in &self.views {
-            row(
+            print_row(
                 &view.name,
                 format!(
                     "exposure {:+.1} EV, mean direct {:.4}, indirect {:.4}",
@@ -92,6 +78,6 @@ impl Report {
                 ),
             );
         }
-        row("seconds", format!("{:.2}", self.seconds));
+        print_row("seconds", format!("{:.2}", self.seconds));
     }
 }

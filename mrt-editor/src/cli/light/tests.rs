@@ -3,6 +3,7 @@ use crate::cli::map::{MapArgs, run as run_map};
 use clap::Parser;
 use std::ffi::OsString;
 use std::fs;
+use std::path::Path;
 
 #[derive(Parser)]
 struct MapLine {
