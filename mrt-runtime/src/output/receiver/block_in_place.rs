@@ -71,8 +71,8 @@ impl BlockInPlace {
         })
     }
 
-    /// The share of its light that a surface gets whose nearest point in the block is `unit`: 1 in the block or in
-    /// niches before it, 0 for surfaces that turn their back on it or are far off.
+    /// The share of its light that a surface gets whose nearest point in the block is `unit`: 1 in the block or in niches
+    /// before it, 0 for surfaces that turn their back on it or are far off.
     pub fn share_lit(&self, point: DVec3, normal: DVec3, unit: DVec3) -> f64 {
         let offset = point - self.map.point(unit);
         let fade = |distance: f64, range: [f64; 2]| {

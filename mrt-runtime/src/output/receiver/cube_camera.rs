@@ -1,5 +1,4 @@
-//! A cube camera in a block's centre (Loos et al. 2011, section 7.2): which part of the mesh each face of the block
-//! sees.
+//! A cube camera in a block's centre (Loos et al. 2011, section 7.2): which part of the mesh each face of the block sees.
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
@@ -42,8 +41,8 @@ impl CubeCamera {
         }
     }
 
-    /// The face through which the camera sees a point, whose place in the unit cube is `unit`; `None` if something
-    /// hides it.
+    /// The face through which the camera sees a point, whose place in the unit cube is `unit`; `None` if something hides
+    /// it.
     pub fn face_that_sees(&self, point: DVec3, unit: DVec3) -> Option<Face> {
         let from_center = unit - 0.5;
         let size = from_center.abs();

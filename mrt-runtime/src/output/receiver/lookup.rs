@@ -14,8 +14,8 @@ pub(super) struct Lookup {
 }
 
 impl Lookup {
-    /// Sorts boxes, given by their smallest and largest corners, into the grid. A cell gets every box that can be
-    /// nearest to a point in it, or at most `margin` metres further than the nearest.
+    /// Sorts boxes, given by their smallest and largest corners, into the grid. A cell gets every box that can be nearest
+    /// to a point in it, or at most `margin` metres further than the nearest.
     pub fn new(boxes: &[(DVec3, DVec3)], margin: f64) -> Self {
         let min = boxes.iter().map(|b| b.0).fold(DVec3::MAX, DVec3::min);
         let max = boxes.iter().map(|b| b.1).fold(DVec3::MIN, DVec3::max);

@@ -10,23 +10,23 @@ use crate::output::receiver::wall_receiver::WallReceiver;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 
-/// Steps off the surface at which a block is looked for, in diagonals of the smallest block: a surface lies on the
-/// border of two blocks or a little behind its own block's wall.
+/// Steps off the surface at which a block is looked for, in diagonals of the smallest block: a surface lies on the border
+/// of two blocks or a little behind its own block's wall.
 const STEPS_OFF_SURFACE: [f64; 3] = [0.01, 0.06, 0.25];
 
 /// Weight of nearness against likeness of direction when one wall is chosen.
 const NEARNESS_WEIGHT: f64 = 0.35;
 
-/// The cube camera decides for surfaces turned like the face that sees them, down to this cosine; the sides of
-/// furniture are seen through the floor but turned like walls.
+/// The cube camera decides for surfaces turned like the face that sees them, down to this cosine; the sides of furniture
+/// are seen through the floor but turned like walls.
 const LEAST_FACING: f64 = 0.35;
 
-/// Added to cosines before they are cubed to weigh walls: 99 % falls to the wall that a surface is parallel to, and
-/// where that is an opening, the walls around it share.
+/// Added to cosines before they are cubed to weigh walls: 99 % falls to the wall that a surface is parallel to, and where
+/// that is an opening, the walls around it share.
 const BLEND_OFFSET: f64 = 0.15;
 
-/// Blocks that are not joined but have nothing between them, such as storeys around an atrium, run into one another
-/// over this distance, in block widths.
+/// Blocks that are not joined but have nothing between them, such as storeys around an atrium, run into one another over
+/// this distance, in block widths.
 const BLEND_DISTANCE: f64 = 0.4;
 
 /// Blocks whose nearness is below this are left out before `sees` is asked; their weight would be its square.
@@ -108,8 +108,8 @@ impl ReceiverMap {
         }
     }
 
-    /// As [`ReceiverMap::new`]; if the level is one closed block, a cube camera in its centre looks at the mesh and
-    /// chooses the walls, as in the paper.
+    /// As [`ReceiverMap::new`]; if the level is one closed block, a cube camera in its centre looks at the mesh and chooses
+    /// the walls, as in the paper.
     ///
     /// `first_hit` casts a ray: it gives the distance from an origin along a direction to the mesh, in lengths of the
     /// direction, and infinity where the ray meets nothing. It is called up to 24,576 times.
@@ -186,8 +186,8 @@ impl ReceiverMap {
         Some(WallReceiver::on_face(block.get(), face, unit))
     }
 
-    /// The block that contains a point, or else the nearest, and the distance to it in metres; `None` in a level
-    /// without blocks.
+    /// The block that contains a point, or else the nearest, and the distance to it in metres; `None` in a level without
+    /// blocks.
     pub fn nearest_block(&self, point: Vec3) -> Option<(BlockIndex, f64)> {
         let found = self.nearest(point.as_dvec3())?;
         Some((BlockIndex::new(found.block), found.distance))
@@ -199,8 +199,7 @@ impl ReceiverMap {
         Some(placed.orientation.face(receiver.face))
     }
 
-    /// Edge or diagonal below which a piece of a mesh is small against every block: the smallest block's diagonal,
-    /// metres.
+    /// Edge or diagonal below which a piece of a mesh is small against every block: the smallest block's diagonal, metres.
     pub(super) fn smallest_diagonal(&self) -> f64 {
         self.smallest_diagonal
     }

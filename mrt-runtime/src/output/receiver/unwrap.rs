@@ -11,12 +11,12 @@ const MAX_HALVINGS: u32 = 12;
 /// Nothing is halved any more once there are this many triangles.
 const MAX_TRIANGLES: usize = 10_000_000;
 
-/// Edges shorter than this share of the smallest block's diagonal are not halved: a triangle along a border reaches
-/// into both blocks however small it is.
+/// Edges shorter than this share of the smallest block's diagonal are not halved: a triangle along a border reaches into
+/// both blocks however small it is.
 const SHORTEST_EDGE: f64 = 0.1;
 
-/// How far corners are moved towards the centre to see which block they belong to, as a share of the way: corners lie
-/// on borders.
+/// How far corners are moved towards the centre to see which block they belong to, as a share of the way: corners lie on
+/// borders.
 const INWARD: f32 = 0.05;
 
 /// A triangle of a mesh, or a part of one, with its receivers.
