@@ -13,7 +13,8 @@ use divan::{Bencher, black_box, counter::ItemsCount};
 use mrt_core::simd::folded::{Albedo, Basis, Folded, Reflected, Unfolded, fold, unfold};
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows};
 use mrt_core::simd::tiles::{
-    CHANNELS, ColumnLists, Element, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
+    CHANNELS, ColumnLists, HALF_TILE, PackedNumber, Rgb, TILE, Term, TileOut, sum_half_tile,
+    sum_tile,
 };
 use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 
@@ -35,7 +36,7 @@ fn level() -> SimdLevel {
 }
 
 /// Numbers as operators are stored.
-trait Number: Element + bytemuck::Pod + std::fmt::Debug {
+trait Number: PackedNumber + bytemuck::Pod + std::fmt::Debug {
     const NAME: &'static str;
     /// A number of -8 to 8, which every storage has exactly.
     fn of(small: i8) -> Self;
@@ -172,7 +173,7 @@ struct RunDots<'a, E> {
     x: [&'a [f32]; CHANNELS],
 }
 
-impl<E: Element> Kernel for RunDots<'_, E> {
+impl<E: PackedNumber> Kernel for RunDots<'_, E> {
     type Output = [[f32; DOT_ROWS]; CHANNELS];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> Self::Output {
@@ -299,7 +300,7 @@ struct RunUnfold<'a, E> {
     signal: [&'a mut [f32]; CHANNELS],
 }
 
-impl<E: Element> Kernel for RunUnfold<'_, E> {
+impl<E: PackedNumber> Kernel for RunUnfold<'_, E> {
     type Output = Unfolded;
     #[inline(always)]
     fn run<L: Lanes>(mut self, l: L) -> Unfolded {

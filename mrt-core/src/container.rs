@@ -4,7 +4,7 @@
 //!
 //! 1. A header of 64 bytes: magic (8), kind (4), layout version (4), content version (4), section
 //!    count (4), file length (8), CRC-32 of header and table with this field zero (4), zeros (28).
-//! 2. A table of 32 bytes a section: name padded with zeros (8), offset (8), length in bytes (8),
+//! 2. A table of 32 bytes for each section: name padded with zeros (8), offset (8), length in bytes (8),
 //!    element type (4), CRC-32 of the section (4).
 //! 3. The sections in the order of the table. Each starts at the next multiple of 64 bytes, gaps are
 //!    zeros, and the last section ends the file.

@@ -1,4 +1,5 @@
-//! Shapes: the canonical cube and what it is warped to, round tubes, form factors between them, and triangle meshes.
+//! Shapes: the unit cube, its symmetries and warps, round tubes, form factors of polygons, and triangle
+//! meshes.
 
 pub mod cube;
 pub mod cube_symmetry;

@@ -1,4 +1,4 @@
-//! Light as functions of direction, and from sphere lights; points to sample it with.
+//! Light as a function of direction, light from spheres, and points to sample light with.
 
 pub mod sh;
 pub mod hemisphere_sh;

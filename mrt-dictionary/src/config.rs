@@ -1,21 +1,22 @@
 //! Settings of a bake and the named presets.
 
+mod check;
+
 use mrt_runtime::blocks::Shape;
 use mrt_runtime::low_level::level::shape::{SHAPE_SETS, shape_set};
-use mrt_runtime::low_level::modular::dictionary_file::MAX_MODES;
 
 /// Everything that decides a dictionary's bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeConfig {
     /// Name of the preset, kept in the file.
     pub preset: String,
-    /// Texels along an edge of a wall.
+    /// Texels along an edge of a wall, 1 to [`MAX_BAKE_RESOLUTION`].
     pub resolution: usize,
     /// Largest number of modes `k_b`; fewer are kept where a multiplet would be cut.
     pub modes: usize,
     /// The light prior.
     pub prior: PriorConfig,
-    /// Appendix A for blocks; `None` leaves the prior as it is.
+    /// Enrichment of the prior (appendix A); `None` leaves the prior as it is.
     pub enrichment: Option<Enrichment>,
     /// Interface lightfields.
     pub lightfield: LightfieldConfig,
@@ -30,38 +31,38 @@ pub struct BakeConfig {
 /// Transport between blocks, by whole paths.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CouplingConfig {
-    /// Emission modes, at most.
+    /// Largest number of emission modes.
     pub emission_modes: usize,
-    /// Response modes `k_r`, at most.
+    /// Largest number of response modes `k_r`.
     pub response_modes: usize,
-    /// Modes that light from other blocks adds to a shape's own, at most.
+    /// Largest number of modes that light from other blocks adds to a shape's own.
     pub foreign_modes: usize,
-    /// Openings that a path of the table crosses, at most.
+    /// Largest number of openings that a path of the table crosses, 1 to 8.
     pub depth: usize,
-    /// The same for paths with a hole in a wall.
+    /// The same for paths through a hole in a wall.
     pub hole_depth: usize,
-    /// Weight of the light on the walls beyond each opening against that on the shape's own, when its modes are
-    /// chosen.
+    /// Weight of the light on the walls beyond each opening against the light on the shape's own walls, when its modes
+    /// are chosen.
     pub beyond_weight: f64,
 }
 
 /// What is computed besides irradiance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OutputConfig {
-    /// Probes along an edge of a block; 0 for none.
+    /// Probes along an edge of a block, 0 to 8; 0 for none. Tubes have none.
     pub probes: usize,
-    /// True for vector irradiance, four coefficients a texel.
+    /// True for vector irradiance, four coefficients a texel. Tubes have none.
     pub vector: bool,
 }
 
 /// The light prior's samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PriorConfig {
-    /// Lights along each axis, inside and beyond each opening.
+    /// Lights along each axis, in the block and beyond each opening, 1 to 32.
     pub lights_per_axis: usize,
-    /// Radius of the sphere lights, in block widths.
+    /// Radius of the sphere lights, in block widths, 0 to 1.
     pub light_radius: f64,
-    /// Vectors kept, `k_d`, at most. They cost nothing at run time, so presets keep all of them.
+    /// Largest number of vectors `k_d`. Vectors cost nothing at run time, so presets keep all of them.
     pub k_d: usize,
 }
 
@@ -73,28 +74,28 @@ pub struct PriorConfig {
 /// albedo 0.9 err by 2.9 % instead of 2.1.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enrichment {
-    /// Of uniform light.
+    /// Weight of uniform light.
     pub uniform_weight: f64,
-    /// Of the functions that are constant on one wall.
+    /// Weight of the functions that are constant on one wall.
     pub constant_weight: f64,
-    /// Of the indirect basis.
+    /// Weight of the indirect basis.
     pub indirect_weight: f64,
 }
 
 /// The interface lightfields.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightfieldConfig {
-    /// Positions along each axis of an opening.
+    /// Positions along each axis of an opening, 1 to 64.
     pub positions: usize,
-    /// Directions along each axis of the hemisphere's square.
+    /// Directions along each axis of the hemisphere's square, 2 to 64.
     pub directions: usize,
-    /// Super-samples along each axis of a direction cell.
+    /// Super-samples along each axis of a direction cell, 1 to 9.
     pub super_samples: usize,
-    /// Lightfield modes `k_rlf`, at most.
+    /// Largest number of lightfield modes `k_rlf`.
     pub lightfield_modes: usize,
-    /// Rounds of interface enrichment (appendix A).
+    /// Rounds of interface enrichment (appendix A), 0 to 8.
     pub enrichment_rounds: usize,
-    /// Frobenius weight of the propagated lightfields against the emitted ones.
+    /// Weight of the propagated lightfields against the emitted ones, in Frobenius norm.
     pub enrichment_weight: f64,
 }
 
@@ -116,6 +117,14 @@ pub enum ConfigError {
         /// The name given.
         found: String,
     },
+    /// An output that round tubes do not have.
+    #[error("the set `{set}` has round tubes, which have no {output}")]
+    NotOfTubes {
+        /// The set of shapes.
+        set: String,
+        /// Which output.
+        output: &'static str,
+    },
     /// A count or weight out of range.
     #[error("{what} is {found}; expected {low} to {high}")]
     OutOfRange {
@@ -133,14 +142,66 @@ pub enum ConfigError {
 /// Largest resolution that is baked: F of the closed cube takes 8 bytes x 36 x resolution⁴, 302 MB there.
 pub const MAX_BAKE_RESOLUTION: usize = 32;
 
-/// Largest number of lightfield samples times modes: 2 GiB a matrix, of which a bake holds several.
-const MAX_LIGHTFIELD_NUMBERS: f64 = (1u64 << 28) as f64;
-
-/// Longest paths of a table: 3D sets have a third more than triple the paths for each opening more.
-const MAX_PATH_DEPTH: f64 = 8.0;
-
 /// Names of the presets.
 pub const PRESETS: [&str; 4] = ["mobile", "standard", "high", "quality"];
+
+/// The settings in which presets differ.
+struct PresetSizes {
+    resolution: usize,
+    modes: usize,
+    lightfield_modes: usize,
+    emission_modes: usize,
+    response_modes: usize,
+    foreign_modes: usize,
+    depth: usize,
+    probes: usize,
+}
+
+impl PresetSizes {
+    const MOBILE: Self = Self {
+        resolution: 5,
+        modes: 12,
+        lightfield_modes: 64,
+        emission_modes: 32,
+        response_modes: 24,
+        foreign_modes: 8,
+        depth: 4,
+        probes: 2,
+    };
+    const STANDARD: Self = Self {
+        resolution: 16,
+        modes: 32,
+        lightfield_modes: 128,
+        emission_modes: 96,
+        response_modes: 64,
+        foreign_modes: 32,
+        depth: 5,
+        probes: 4,
+    };
+    const HIGH: Self = Self {
+        modes: 64,
+        lightfield_modes: 192,
+        emission_modes: 160,
+        response_modes: 160,
+        foreign_modes: 48,
+        ..Self::STANDARD
+    };
+    const QUALITY: Self = Self {
+        modes: 96,
+        foreign_modes: 96,
+        ..Self::HIGH
+    };
+
+    fn of(name: &str) -> Option<Self> {
+        match name {
+            "mobile" => Some(Self::MOBILE),
+            "standard" => Some(Self::STANDARD),
+            "high" => Some(Self::HIGH),
+            "quality" => Some(Self::QUALITY),
+            _ => None,
+        }
+    }
+}
 
 impl BakeConfig {
     /// A named preset: `mobile` (5² texels, 12 modes), `standard` (16², 32), `high` (16², 64) or `quality` (16², 96).
@@ -148,44 +209,35 @@ impl BakeConfig {
     /// # Errors
     /// [`ConfigError::UnknownPreset`].
     pub fn preset(name: &str) -> Result<Self, ConfigError> {
-        let (resolution, modes, lightfield_modes, [emission, response, foreign], depth) = match name
-        {
-            "mobile" => (5, 12, 64, [32, 24, 8], 4),
-            "standard" => (16, 32, 128, [96, 64, 32], 5),
-            "high" => (16, 64, 192, [160, 160, 48], 5),
-            "quality" => (16, 96, 192, [160, 160, 96], 5),
-            _ => {
-                return Err(ConfigError::UnknownPreset {
-                    found: name.to_owned(),
-                });
-            }
-        };
+        let sizes = PresetSizes::of(name).ok_or_else(|| ConfigError::UnknownPreset {
+            found: name.to_owned(),
+        })?;
         Ok(Self {
             preset: name.to_owned(),
-            resolution,
-            modes,
+            resolution: sizes.resolution,
+            modes: sizes.modes,
             prior: PriorConfig::default(),
             enrichment: Some(Enrichment::default()),
             lightfield: LightfieldConfig {
-                lightfield_modes,
+                lightfield_modes: sizes.lightfield_modes,
                 ..LightfieldConfig::default()
             },
             shapes: SHAPE_SETS[0].0.to_owned(),
             coupling: CouplingConfig {
-                emission_modes: emission,
-                response_modes: response,
-                foreign_modes: foreign,
-                depth,
+                emission_modes: sizes.emission_modes,
+                response_modes: sizes.response_modes,
+                foreign_modes: sizes.foreign_modes,
+                depth: sizes.depth,
                 ..CouplingConfig::default()
             },
             outputs: OutputConfig {
-                probes: if name == "mobile" { 2 } else { 4 },
+                probes: sizes.probes,
                 vector: false,
             },
         })
     }
 
-    /// The preset for a set of shapes: tubes have 32² texels a chart, or 12² of `mobile`, and no probes.
+    /// The preset for a set of shapes. Sets of tubes have 32² texels a chart (`mobile` has 12²) and no probes.
     ///
     /// # Errors
     /// [`ConfigError::UnknownPreset`] and [`ConfigError::UnknownSet`].
@@ -210,132 +262,7 @@ impl BakeConfig {
         shape_set(&self.shapes).is_some_and(|shapes| shapes.iter().any(is_tube))
     }
 
-    /// Checks every setting.
-    ///
-    /// # Errors
-    /// [`ConfigError::OutOfRange`], for the first that is not within its bounds.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        if shape_set(&self.shapes).is_none() {
-            return Err(ConfigError::UnknownSet {
-                found: self.shapes.clone(),
-            });
-        }
-        let lightfield = &self.lightfield;
-        let max_modes = MAX_MODES as f64;
-        let max_resolution = MAX_BAKE_RESOLUTION as f64;
-        let weights = self.enrichment.as_ref().map_or([0.0; 3], |e| {
-            [e.uniform_weight, e.constant_weight, e.indirect_weight]
-        });
-        let ranges = [
-            ("resolution", self.resolution as f64, 1.0, max_resolution),
-            ("number of modes", self.modes as f64, 1.0, max_modes),
-            (
-                "lights per axis",
-                self.prior.lights_per_axis as f64,
-                1.0,
-                32.0,
-            ),
-            ("light radius", self.prior.light_radius, 0.0, 1.0),
-            ("k_d", self.prior.k_d as f64, 1.0, f64::INFINITY),
-            ("uniform weight", weights[0], 0.0, 1000.0),
-            ("constant weight", weights[1], 0.0, 1000.0),
-            ("indirect weight", weights[2], 0.0, 1000.0),
-            (
-                "lightfield positions",
-                lightfield.positions as f64,
-                1.0,
-                64.0,
-            ),
-            (
-                "lightfield directions",
-                lightfield.directions as f64,
-                2.0,
-                64.0,
-            ),
-            ("super-samples", lightfield.super_samples as f64, 1.0, 9.0),
-            (
-                "number of lightfield modes",
-                lightfield.lightfield_modes as f64,
-                1.0,
-                max_modes,
-            ),
-            (
-                "number of emission modes",
-                self.coupling.emission_modes as f64,
-                1.0,
-                max_modes,
-            ),
-            (
-                "number of response modes",
-                self.coupling.response_modes as f64,
-                1.0,
-                max_modes,
-            ),
-            (
-                "number of foreign modes",
-                self.coupling.foreign_modes as f64,
-                0.0,
-                max_modes,
-            ),
-            (
-                "path depth",
-                self.coupling.depth as f64,
-                1.0,
-                MAX_PATH_DEPTH,
-            ),
-            (
-                "path depth through holes",
-                self.coupling.hole_depth as f64,
-                1.0,
-                MAX_PATH_DEPTH,
-            ),
-            ("beyond weight", self.coupling.beyond_weight, 0.0, 1000.0),
-            (
-                "probes along an edge",
-                self.outputs.probes as f64,
-                0.0,
-                if self.has_tubes() { 0.0 } else { 8.0 },
-            ),
-            (
-                "number of vector irradiances",
-                f64::from(u8::from(self.outputs.vector)),
-                0.0,
-                if self.has_tubes() { 0.0 } else { 1.0 },
-            ),
-            (
-                "lightfield samples times modes",
-                (lightfield.positions * lightfield.directions).pow(2) as f64
-                    * lightfield.lightfield_modes as f64,
-                1.0,
-                MAX_LIGHTFIELD_NUMBERS,
-            ),
-            (
-                "enrichment rounds",
-                lightfield.enrichment_rounds as f64,
-                0.0,
-                8.0,
-            ),
-            (
-                "enrichment weight",
-                lightfield.enrichment_weight,
-                0.0,
-                100.0,
-            ),
-        ];
-        for (what, found, low, high) in ranges {
-            if !(low..=high).contains(&found) {
-                return Err(ConfigError::OutOfRange {
-                    what,
-                    low,
-                    high,
-                    found,
-                });
-            }
-        }
-        Ok(())
-    }
-
-    /// The settings as text for people, kept in the file.
+    /// The settings as text for people, which is kept in the file.
     pub fn describe(&self) -> String {
         let enrichment = match &self.enrichment {
             None => "not enriched".to_owned(),
@@ -435,27 +362,5 @@ impl Default for LightfieldConfig {
             enrichment_rounds: 1,
             enrichment_weight: 1.0,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn presets_are_in_range_and_zero_modes_are_not() {
-        for name in PRESETS {
-            let mut config = BakeConfig::preset(name).expect("a preset");
-            assert_eq!(config.check(), Ok(()));
-            config.modes = 0;
-            assert!(matches!(
-                config.check(),
-                Err(ConfigError::OutOfRange {
-                    what: "number of modes",
-                    ..
-                })
-            ));
-        }
-        assert!(BakeConfig::preset("ultra").is_err());
     }
 }

@@ -5,5 +5,6 @@
 
 pub mod config;
 pub mod progress;
-pub mod parallel_products;
+mod matrix_parts;
+mod parallel_products;
 pub mod modular;

@@ -1,13 +1,14 @@
 //! The bake of Modular Radiance Transfer: [`bake`] is its list of calls for cubes, [`bake_tubes`] for round tubes, and
 //! [`variants`] for blocks that need operators of their own.
 
-pub mod outputs;
 pub mod surface;
+pub mod outputs;
 pub mod one_bounce;
 pub mod light_prior;
 pub mod transport;
 pub mod paths;
 pub mod joint;
+mod shape_set;
 pub mod lightfield;
 pub mod bake;
 pub mod bake_tubes;

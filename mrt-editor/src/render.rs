@@ -2,7 +2,6 @@
 
 pub mod camera;
 pub mod file;
-pub mod hdr;
 pub mod level_view;
 pub mod lit;
 pub mod picture;

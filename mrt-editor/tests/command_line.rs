@@ -1,6 +1,6 @@
 //! The `mrt` program as a user meets it: exit codes, messages, and files that are whole or not there.
 
-use mrt_core::reference::oracle_file::oracle_folder_or_report;
+use mrt_core::reference::oracle_file::oracle_folder;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;
@@ -278,10 +278,9 @@ fn bake_writes_a_whole_file_or_none() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn accuracy_prints_an_object_a_light() {
-    let Some(oracle) = oracle_folder_or_report("`mrt accuracy`") else {
-        return;
-    };
+    let oracle = oracle_folder().expect("shared/oracle exists");
     let folder = folder();
     let file = |name: &str| oracle.join(name).into_os_string();
     let output = mrt(
@@ -316,10 +315,9 @@ fn accuracy_prints_an_object_a_light() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
-    let Some(oracle) = oracle_folder_or_report("refusals of `mrt accuracy`") else {
-        return;
-    };
+    let oracle = oracle_folder().expect("shared/oracle exists");
     let folder = folder();
     let file = |name: &str| oracle.join(name).into_os_string();
     // The built-in set has no way up.
@@ -374,10 +372,9 @@ fn accuracy_refuses_what_it_cannot_compare_and_goes_on() {
 }
 
 #[test]
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
 fn accuracy_takes_the_set_that_a_stack_needs() {
-    let Some(oracle) = oracle_folder_or_report("`mrt accuracy` on a stack") else {
-        return;
-    };
+    let oracle = oracle_folder().expect("shared/oracle exists");
     let folder = folder();
     let arguments = [
         "accuracy".into(),

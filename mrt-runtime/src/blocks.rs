@@ -1,7 +1,7 @@
-//! What levels are made of: blocks of canonical shapes, the openings that join them, and doors.
+//! The parts of a level: blocks of canonical shapes, the openings that join them, and doors.
 //!
-//! Most levels are read from text ([`Level::from_text`](crate::Level::from_text)). A program that builds one fills the
-//! lists of a [`Level`](crate::Level) with these.
+//! Most levels are read from text ([`Level::from_text`](crate::Level::from_text)). A program that builds a level fills
+//! the lists of a [`Level`](crate::Level) with these parts.
 
 pub use crate::level::block::{Block, Connection, Door, Opening};
 pub use crate::level::cells::CellsError;

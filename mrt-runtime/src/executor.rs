@@ -1,18 +1,19 @@
-//! Who runs the parts of a frame: the caller's thread, or threads that the caller lends.
+//! Runs the parts of a frame: on the caller's thread, or on threads that the caller provides.
 
 use std::fmt::Debug;
 use std::sync::{Mutex, PoisonError};
 
-/// Runs tasks, at once or one after another.
+/// Runs tasks, in parallel or one after another.
 pub trait Executor: Debug + Send + Sync {
-    /// Tasks that it runs at once, about.
+    /// About how many tasks run in parallel.
     fn workers(&self) -> usize;
 
-    /// Calls `task` with each number below `tasks` once, on any threads in any order, and returns when all are done.
+    /// Calls `task` once with each number below `tasks`, on any threads in any order, and returns when all calls have
+    /// returned.
     fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync));
 }
 
-/// On the caller's thread.
+/// Runs all tasks on the caller's thread.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Serial;
 
@@ -26,7 +27,7 @@ impl Executor for Serial {
     }
 }
 
-/// On the threads of rayon's current pool.
+/// Runs tasks on the threads of rayon's current pool.
 #[cfg(feature = "rayon")]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rayon;
@@ -43,13 +44,13 @@ impl Executor for Rayon {
     }
 }
 
-/// Parts that one stage of a frame is cut into, at most.
+/// Most parts of a stage of a frame.
 pub(crate) const MAX_TASKS: usize = 64;
 
-/// Parts a worker: enough that one slow part does not keep the others waiting for long.
+/// Parts for each worker: enough that other workers do not wait long for one slow part.
 const TASKS_PER_WORKER: usize = 4;
 
-/// Number of parts for so many blocks.
+/// Number of parts into which to divide the work on `blocks` blocks.
 pub(crate) fn task_count(executor: &dyn Executor, blocks: usize) -> usize {
     match executor.workers() {
         0 | 1 => 1,
@@ -59,7 +60,10 @@ pub(crate) fn task_count(executor: &dyn Executor, blocks: usize) -> usize {
     .max(1)
 }
 
-/// Calls `f` with each part, which it owns meanwhile; nothing is allocated.
+/// Calls `f` with each part, on the executor's threads; allocates nothing.
+///
+/// # Panics
+/// If there are more than [`MAX_TASKS`] parts.
 pub(crate) fn run_parts<T: Send>(
     executor: &dyn Executor,
     parts: impl IntoIterator<Item = T>,

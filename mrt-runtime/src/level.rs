@@ -1,4 +1,5 @@
-//! What a designer edits: canonical shapes, blocks that are warped copies of them, and the openings that join blocks.
+//! Levels, as a designer edits them: canonical shapes, blocks that are warped copies of shapes, and openings that join
+//! blocks.
 
 pub mod block_index;
 pub mod shape;

@@ -1,7 +1,7 @@
-//! The parts behind the names at the root, for tools and bakes. They follow the needs of this workspace: any of them may
-//! change, move or go in any release.
+//! The parts behind the names at the root, for tools and bakes. They follow the needs of this workspace: any release
+//! may change, move or remove any of them.
 
-/// Shapes, blocks, checks, and levels whose blocks stand ready to be lit.
+/// Shapes, blocks, the checks of a level, and levels ready to be lit.
 pub mod level {
     pub use crate::level::*;
 }
@@ -11,7 +11,7 @@ pub mod light {
     pub use crate::light::*;
 }
 
-/// Texel layout, lightmap and probes.
+/// Layout of texels, lightmap and probes.
 pub mod output {
     pub use crate::output::*;
 }

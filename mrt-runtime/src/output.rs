@@ -1,4 +1,4 @@
-//! What a frame gives: the padded lightmap and light at probes, and where their texels are kept.
+//! The outputs of a frame: the padded lightmap and light at probes, and the layout of texels in memory.
 
 pub mod texel_layout;
 pub mod lightmap_atlas;

@@ -1,5 +1,5 @@
-//! A frame with each instruction set of this machine against the scalar reference, and against the bits that it always had.
-//! Needs little, so that it can run under emulation too.
+//! Compares frames with each instruction set of this machine with the scalar reference, and with recorded bits. It depends
+//! on few crates, so that it can run under emulation too.
 
 use glam::{Vec3, vec3};
 use mrt_core::simd::SimdLevel;
@@ -9,7 +9,8 @@ use mrt_runtime::{
     AssembleConfig, Bounces, Dictionary, Frame, FrameConfig, Light, Outputs, ProbeOrder, Scene,
 };
 
-/// Share of the brightest texel by which levels may differ: sums of some hundred products in another order, in `f32`.
+/// Largest difference between instruction sets, as a share of the brightest texel: sums of some hundred products in another
+/// order, in `f32`.
 const ROUNDING: f32 = 1e-5;
 
 fn dictionary() -> Dictionary {
@@ -22,7 +23,7 @@ fn every_level_gives_the_light_of_the_scalar_reference() {
     let dictionary = dictionary();
     let level = maze(9, vec3(0.7, 0.5, 0.3), 3);
     let lamp = |block: usize, intensity: Vec3| Light::Sphere {
-        // Off every texel's line through an edge of an opening: no texel is lit or not by rounding.
+        // No line from the lamp to a texel meets an edge of an opening, so rounding does not decide whether a texel is lit.
         position: level.blocks[block].warp.center().as_vec3() + vec3(0.113, 0.207, -0.154),
         radius: 0.1,
         intensity,
@@ -77,8 +78,8 @@ fn every_level_gives_the_light_of_the_scalar_reference() {
     }
 }
 
-/// Bits of all that frames of each level compute with `f32`, `f16` and `int8`; the same in every build, on every machine.
-/// To be replaced when kernels add up in another order on purpose.
+/// For each instruction set, a hash of all bits that frames compute with `f32`, `f16` and `int8`. It is the same in every
+/// build and on every machine. Replace it when kernels change the order of their sums on purpose.
 const HASHES: [(SimdLevel, u64); 5] = [
     (SimdLevel::Scalar, 0x6f90_eaaf_d940_b854),
     (SimdLevel::Sse2, 0x812c_453b_4262_f985),
@@ -87,7 +88,7 @@ const HASHES: [(SimdLevel, u64); 5] = [
     (SimdLevel::Neon, 0x86dd_6f00_8711_7f07),
 ];
 
-/// Fowler, Noll and Vo's hash 1a.
+/// The hash FNV-1a of Fowler, Noll and Vo, continued over more values.
 fn hash(hash: u64, values: &[f32]) -> u64 {
     let bytes = values.iter().flat_map(|x| x.to_bits().to_le_bytes());
     bytes.fold(hash, |h, byte| {
@@ -118,7 +119,7 @@ fn hash_of(dictionary: &Dictionary, simd: SimdLevel) -> u64 {
             ..FrameConfig::default()
         };
         let mut frame = Frame::new(&scene, config);
-        // The caller's direct light, so that libraries' roots have no part in it.
+        // Direct light from the caller, so that no library's square root takes part.
         let light = |k: usize| ((k * 7919 + 13) % 2048) as f32 / 2048.0;
         let direct: Vec<f32> = (0..3 * scene.texel_count()).map(light).collect();
         for bounces in [Bounces::Count(1), Bounces::Feedback, Bounces::Count(4)] {

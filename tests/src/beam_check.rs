@@ -1,7 +1,6 @@
-//! Beams of direct light against the scalar walk, texel by texel.
+//! Compares beams of direct light with the scalar walk through openings, texel by texel.
 
-use crate::normal_of;
-use crate::position_of;
+use crate::irradiance::{normal_of, position_of};
 use glam::{DVec3, Vec3};
 use mrt_core::simd::SimdLevel;
 use mrt_runtime::BlockIndex;
@@ -12,19 +11,20 @@ use mrt_runtime::low_level::light::placed::{PlacedLight, place};
 use mrt_runtime::shadows::{Openings, Receiver, Toward, Visibility};
 use mrt_runtime::{Light, Scene};
 
-/// Share of its own irradiance that a texel may differ by.
+/// Tolerated difference of a texel's irradiance, relative to that irradiance.
 const RELATIVE: f32 = 1e-5;
 
-/// Share of the irradiance of a surface that faces the light that a texel may differ by: its cosine is rounded.
+/// Tolerated difference of a texel's irradiance, relative to that of a surface which faces the light: the cosine is
+/// rounded.
 const OF_FACING: f32 = 1e-6;
 
-/// Radians that the angle from a spot's axis may differ by.
+/// Tolerated difference of the angle from a spot's axis, radians.
 const ANGLE: f32 = 2e-6;
 
-/// A texel whose visibility flips when it moves by this much, in diagonals of its block, is on a shadow's edge.
+/// A texel is on the edge of a shadow if its visibility flips when it moves by this share of its block's diagonal.
 const EDGE: f64 = 1e-5;
 
-/// The texels of a block, by slot.
+/// Positions and normals of a block's texels, by slot.
 pub fn texels(scene: &Scene, block: BlockIndex) -> TexelPlanes<'_> {
     let slots = scene.layout.slots(scene.layout.rank[block.get()]);
     TexelPlanes {
@@ -41,7 +41,7 @@ fn shadows<'a>(scene: &'a Scene, doors: &'a [f32]) -> Shadows<'a, Openings> {
     }
 }
 
-/// The beams of one light; an exact one stands for all of its block.
+/// The beams of one light. An exact beam replaces all other beams of its block.
 pub fn beams(
     scene: &Scene,
     tracer: &mut BeamTracer,
@@ -64,7 +64,7 @@ pub fn beams(
     beams
 }
 
-/// Irradiance at all texels from some beams, in the order of the scene's texels.
+/// Irradiance of all texels from these beams, in the order of the scene's texels.
 fn lit(
     level: SimdLevel,
     scene: &Scene,
@@ -102,113 +102,158 @@ fn lit(
     out
 }
 
-/// What was compared.
+/// Counts of what was compared.
 #[derive(Debug, Default)]
 pub struct Tally {
-    /// Texels compared, once a light.
+    /// Texels compared, counted once for each light.
     pub texels: usize,
-    /// Those with light.
+    /// Texels with light.
     pub lit: usize,
-    /// Those on the edge of a shadow, which may differ.
+    /// Texels on the edge of a shadow that differ, as they may.
     pub edges: usize,
-    /// Those whose shadows planes do not tell.
+    /// Exact beams: the planes of a beam cannot describe the shadows in their blocks.
     pub exact: usize,
     /// Beams traced.
     pub beams: usize,
-    /// Most planes of a beam.
+    /// Largest number of planes of a beam.
     pub most_planes: usize,
 }
 
-/// Compares every texel, light and level with the reference.
+impl Tally {
+    fn count_beams(&mut self, beams: &[Beam]) {
+        self.beams += beams.len();
+        self.exact += beams.iter().filter(|b| b.exact).count();
+        let planes = beams.iter().map(|b| b.planes().len());
+        self.most_planes = planes.max().unwrap_or(0).max(self.most_planes);
+    }
+}
+
+/// Compares the irradiance that beams give with that of the walk, for every light, texel and instruction set.
 pub fn compare(scene: &Scene, lights: &[Light], doors: &[f32], tally: &mut Tally) {
     let mut tracer = BeamTracer::new(&scene.level);
     for &light in lights {
         let placed = place(&scene.level, light).expect("a sound light");
         let beams = beams(scene, &mut tracer, &placed, doors);
-        tally.beams += beams.len();
-        tally.exact += beams.iter().filter(|b| b.exact).count();
-        let planes = beams.iter().map(|b| b.planes().len());
-        tally.most_planes = planes.max().unwrap_or(0).max(tally.most_planes);
+        tally.count_beams(&beams);
         let found: Vec<Vec<Vec3>> = SimdLevel::available()
             .map(|level| lit(level, scene, &placed, doors, &beams))
             .collect();
+        let walk = Walk {
+            scene,
+            doors,
+            light,
+            placed,
+        };
         for (index, block) in scene.level.blocks.iter().enumerate() {
             for texel in block.texels.clone() {
-                let position = position_of(scene, texel).as_dvec3();
-                let normal = normal_of(scene, texel).as_dvec3();
-                let at = |position: DVec3, normal: DVec3| {
-                    let receiver = Receiver {
-                        block: BlockIndex::new(index),
-                        position,
-                    };
-                    irradiance(shadows(scene, doors), &placed, receiver, normal)
+                let receiver = Receiver {
+                    block: BlockIndex::new(index),
+                    position: position_of(scene, texel).as_dvec3(),
                 };
-                let expected = at(position, normal);
-                let to_light = match light {
-                    Light::Sphere { position: p, .. } | Light::Spot { position: p, .. } => {
-                        (p.as_dvec3() - position).normalize_or_zero()
-                    }
-                    Light::Directional { direction, .. } => -direction.as_dvec3().normalize(),
-                };
-                let facing = at(position, to_light);
-                let of_falloff = match light {
-                    Light::Spot {
-                        position: p,
-                        radius,
-                        intensity,
-                        inner_angle,
-                        outer_angle,
-                        ..
-                    } => {
-                        let squared = p.as_dvec3().distance_squared(position) as f32;
-                        let full = intensity / squared.max(radius * radius);
-                        full * 1.5 * ANGLE / (outer_angle - inner_angle)
-                    }
-                    _ => Vec3::ZERO,
-                };
-                let slack = RELATIVE * expected + OF_FACING * facing + of_falloff;
-                tally.texels += 1;
-                tally.lit += usize::from(expected != Vec3::ZERO);
-                let is_near = |found: &Vec<Vec3>| {
-                    let apart = (found[texel] - expected).abs();
-                    found[texel].is_finite() && apart.cmple(slack).all()
-                };
-                if found.iter().all(is_near) {
-                    continue;
-                }
-                let (low, high) = block.bounds;
-                let step = EDGE * (high - low).length();
-                let toward = match light {
-                    Light::Sphere { position, .. } | Light::Spot { position, .. } => {
-                        let position = position.as_dvec3();
-                        let block = scene.level.block_at(position);
-                        Toward::Point {
-                            position,
-                            block: block.expect("placed"),
-                        }
-                    }
-                    Light::Directional { .. } => Toward::Infinity(to_light),
-                };
-                let fraction = |k: i32| {
-                    let offset = DVec3::new(
-                        f64::from(k % 3 - 1),
-                        f64::from(k / 3 % 3 - 1),
-                        f64::from(k / 9 - 1),
-                    );
-                    let receiver = Receiver {
-                        block: BlockIndex::new(index),
-                        position: position + offset * step,
-                    };
-                    Openings.fraction(&scene.level, doors, receiver, toward)
-                };
-                let flips = (1..27).any(|k| fraction(k) != fraction(0));
-                let values: Vec<Vec3> = found.iter().map(|f| f[texel]).collect();
-                assert!(
-                    flips,
-                    "texel {texel} of block {index} at {position}, {light:?}: {values:?} where {expected}"
-                );
-                tally.edges += 1;
+                let found: Vec<Vec3> = found.iter().map(|found| found[texel]).collect();
+                walk.compare_texel(receiver, texel, &found, tally);
             }
         }
+    }
+}
+
+/// The scalar walk from texels to one light.
+struct Walk<'a> {
+    scene: &'a Scene,
+    doors: &'a [f32],
+    light: Light,
+    placed: PlacedLight,
+}
+
+impl Walk<'_> {
+    /// Compares the irradiance that each instruction set found at a texel.
+    fn compare_texel(&self, receiver: Receiver, texel: usize, found: &[Vec3], tally: &mut Tally) {
+        let normal = normal_of(self.scene, texel).as_dvec3();
+        let expected = self.irradiance(receiver, normal);
+        let slack = self.slack(receiver, expected);
+        tally.texels += 1;
+        tally.lit += usize::from(expected != Vec3::ZERO);
+        let is_near = |found: &Vec3| {
+            let apart = (found - expected).abs();
+            found.is_finite() && apart.cmple(slack).all()
+        };
+        if found.iter().all(is_near) {
+            return;
+        }
+        let Receiver { block, position } = receiver;
+        assert!(
+            self.is_on_edge(receiver),
+            "texel {texel} of block {block:?} at {position}, {:?}: {found:?} where {expected}",
+            self.light
+        );
+        tally.edges += 1;
+    }
+
+    fn irradiance(&self, receiver: Receiver, normal: DVec3) -> Vec3 {
+        irradiance(
+            shadows(self.scene, self.doors),
+            &self.placed,
+            receiver,
+            normal,
+        )
+    }
+
+    /// Direction from a point to the light; zero in the light's very position.
+    fn to_light(&self, point: DVec3) -> DVec3 {
+        match self.light {
+            Light::Sphere { position, .. } | Light::Spot { position, .. } => {
+                (position.as_dvec3() - point).normalize_or_zero()
+            }
+            Light::Directional { direction, .. } => -direction.as_dvec3().normalize(),
+        }
+    }
+
+    /// Tolerated difference of a texel's irradiance.
+    fn slack(&self, receiver: Receiver, expected: Vec3) -> Vec3 {
+        let facing = self.irradiance(receiver, self.to_light(receiver.position));
+        let of_falloff = match self.light {
+            Light::Spot {
+                position,
+                radius,
+                intensity,
+                inner_angle,
+                outer_angle,
+                ..
+            } => {
+                let squared = position.as_dvec3().distance_squared(receiver.position) as f32;
+                let full = intensity / squared.max(radius * radius);
+                full * 1.5 * ANGLE / (outer_angle - inner_angle)
+            }
+            _ => Vec3::ZERO,
+        };
+        RELATIVE * expected + OF_FACING * facing + of_falloff
+    }
+
+    /// True if a small move of the receiver hides the light or uncovers it.
+    fn is_on_edge(&self, receiver: Receiver) -> bool {
+        let level = &self.scene.level;
+        let toward = match self.light {
+            Light::Sphere { position, .. } | Light::Spot { position, .. } => {
+                let position = position.as_dvec3();
+                let block = level.block_at(position).expect("the light is inside");
+                Toward::Point { position, block }
+            }
+            Light::Directional { .. } => Toward::Infinity(self.to_light(receiver.position)),
+        };
+        let (low, high) = level.blocks[receiver.block.get()].bounds;
+        let step = EDGE * (high - low).length();
+        let fraction = |k: i32| {
+            let offset = DVec3::new(
+                f64::from(k % 3 - 1),
+                f64::from(k / 3 % 3 - 1),
+                f64::from(k / 9 - 1),
+            );
+            let moved = Receiver {
+                position: receiver.position + offset * step,
+                ..receiver
+            };
+            Openings.fraction(level, self.doors, moved, toward)
+        };
+        (1..27).any(|k| fraction(k) != fraction(0))
     }
 }

@@ -1,4 +1,4 @@
-//! What the tests of warped blocks share: warps, the canonical operators, lights and errors.
+//! For tests of warped blocks: warps, canonical operators, lights and errors.
 
 use glam::{DMat3, DQuat, DVec3};
 use mrt_core::geometry::cube::Face;
@@ -6,21 +6,23 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::lighting::sampling::hash;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_dictionary::config::{Enrichment, PriorConfig};
-use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior, light_prior};
+use mrt_dictionary::modular::light_prior::basis::light_prior;
+use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior};
 use mrt_dictionary::modular::light_prior::warped::{
     warped_direct_samples, warped_light_radius, warped_prior_lights,
 };
 use mrt_dictionary::modular::one_bounce::cube::{
     Reconstruction, closed_cube_bounce, restrict_to_shape,
 };
-use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::one_bounce::warped::warped_bounce;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
+use mrt_dictionary::modular::surface::walls::warped::WarpedWalls;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
 use mrt_dictionary::progress::Progress;
 use mrt_runtime::blocks::Shape;
 
-/// Texels along an edge of the standard preset.
+/// Texels along an edge of a wall in the standard preset.
 pub const RESOLUTION: usize = 16;
 /// Modes of the standard preset.
 pub const MODES: usize = 32;
@@ -39,19 +41,19 @@ pub fn canonical(shape: &Shape) -> BlockTransport {
     block_transport(&folded, &folded, &enriched.basis, &classes, MODES)
 }
 
-/// A warped block with the transport of each of the three levels.
+/// A warped block with the transport that each way of adapting it gives.
 pub struct Warped {
     /// Its walls, texel by texel.
     pub walls: WarpedWalls,
-    /// F of the warped walls, to which the levels are held.
+    /// F of the warped walls: the exact first bounce, texels x texels.
     pub bounce: Matrix<f64>,
-    /// (T, U) of reuse, re-gather and rebuild.
-    pub levels: [(Matrix<f64>, Matrix<f64>); 3],
-    /// Radius of test lights.
+    /// (T, U) of canonical, re-gathered and rebuilt transport.
+    pub transports: [(Matrix<f64>, Matrix<f64>); 3],
+    /// Radius of lights, world units.
     pub light_radius: f64,
 }
 
-/// A shape under a warp, with the transport of each level.
+/// A shape under a warp, with all its transports.
 pub fn warped(shape: &Shape, canonical: &BlockTransport, warp: &Hexahedron) -> Warped {
     assert_eq!(warp.check(), Ok(()));
     let faces: Vec<Face> = shape.walls().collect();
@@ -73,7 +75,7 @@ pub fn warped(shape: &Shape, canonical: &BlockTransport, warp: &Hexahedron) -> W
     let gathered = regathered(&bounce, &canonical.implicit_lighting);
     let coefficients = &canonical.coefficients_from_direct;
     Warped {
-        levels: [
+        transports: [
             (coefficients.clone(), canonical.indirect_basis.clone()),
             (coefficients.clone(), gathered),
             (own.coefficients_from_direct, own.indirect_basis),
@@ -85,16 +87,15 @@ pub fn warped(shape: &Shape, canonical: &BlockTransport, warp: &Hexahedron) -> W
 }
 
 impl Warped {
-    /// First bounce of each level from direct light (texels x lights), reflected fully.
+    /// First bounce that each transport gives from direct light (texels x lights) between white walls.
     pub fn first_bounce(&self, direct: &Matrix<f64>) -> [Matrix<f64>; 3] {
-        [0, 1, 2].map(|level| {
-            let (t, u) = &self.levels[level];
-            multiply(u.view(), multiply(t.view(), direct.view()).view())
-        })
+        self.transports
+            .each_ref()
+            .map(|(t, u)| multiply(u.view(), multiply(t.view(), direct.view()).view()))
     }
 }
 
-/// Uniform in [0, 1).
+/// A number in [0, 1), from a seed and an index.
 pub fn random(seed: u32, index: u32) -> f64 {
     f64::from(hash(seed, index)) / 4_294_967_296.0
 }
@@ -104,30 +105,30 @@ pub fn random_point(seed: u32, index: u32) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|axis| random(seed, 3 * index + axis)))
 }
 
-/// "Mid" lights in the unit cube, 0.1 or more from every wall.
+/// Random lights in the unit cube, at least 0.1 from every wall.
 pub fn mid_lights(count: u32) -> Vec<DVec3> {
     (0..count).map(|k| random_point(1, k) * 0.8 + 0.1).collect()
 }
 
-/// The image of the unit cube's corners.
+/// The hexahedron whose corners are the images of the unit cube's.
 pub fn image(map: impl Fn(DVec3) -> DVec3) -> Hexahedron {
     Hexahedron {
         corners: std::array::from_fn(|k| map(Hexahedron::unit_corner(k))),
     }
 }
 
-/// A cube stretched to this size.
+/// A box of this size.
 pub fn stretched(size: [f64; 3]) -> Hexahedron {
     image(|p| p * DVec3::from_array(size))
 }
 
-/// x moves by `shear` per y.
+/// A cube whose points move by `shear` times y along x.
 pub fn sheared(shear: f64) -> Hexahedron {
     let map = DMat3::from_cols(DVec3::X, DVec3::new(shear, 1.0, 0.0), DVec3::Z);
     image(|p| map * p)
 }
 
-/// Every coordinate of every corner moved by up to `size`.
+/// A cube each of whose corners is moved at random, by up to `size` along each axis.
 pub fn jittered(size: f64, seed: u32) -> Hexahedron {
     Hexahedron {
         corners: std::array::from_fn(|k| {
@@ -137,7 +138,7 @@ pub fn jittered(size: f64, seed: u32) -> Hexahedron {
     }
 }
 
-/// A tower whose top has `width` times the width of its foot; planar faces, but no affine image.
+/// A tower whose top is `width` times as wide as its foot. Its faces are planar, and yet it is no affine image of the cube.
 pub fn frustum(width: f64) -> Hexahedron {
     image(|p| {
         let scale = 1.0 + (width - 1.0) * p.y;
@@ -145,7 +146,7 @@ pub fn frustum(width: f64) -> Hexahedron {
     })
 }
 
-/// A tower whose top is turned, degrees.
+/// A tower whose top is turned by `angle`, in degrees.
 pub fn twisted(angle: f64) -> Hexahedron {
     image(|p| {
         let turn = DQuat::from_rotation_y(p.y * angle.to_radians());
@@ -153,7 +154,7 @@ pub fn twisted(angle: f64) -> Hexahedron {
     })
 }
 
-/// Relative L2 error with squares weighted by `areas`.
+/// Relative L2 error, with squares weighted by `areas`.
 pub fn rel_l2_by(areas: &[f64], found: &[f64], truth: &[f64]) -> f64 {
     let (mut miss, mut size) = (0.0, 0.0);
     for ((f, t), area) in found.iter().zip(truth).zip(areas) {

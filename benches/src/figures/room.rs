@@ -5,15 +5,16 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::{Matrix, multiply};
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::radiosity::direct::{PointLight, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve_rgb;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactScene, Side};
 use mrt_dictionary::config::{Enrichment, PriorConfig};
-use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior, light_prior};
+use mrt_dictionary::modular::light_prior::basis::light_prior;
+use mrt_dictionary::modular::light_prior::cube::{direct_samples, enriched_prior};
 use mrt_dictionary::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
-use mrt_dictionary::modular::surface::mirrors::texel_parity_classes;
+use mrt_dictionary::modular::surface::mirrors::cube::texel_parity_classes;
 use mrt_dictionary::modular::transport::modes::{BlockTransport, block_transport, fold_bounce};
 use mrt_dictionary::progress::Progress;
 use mrt_editor::render::camera::Camera;
@@ -102,7 +103,7 @@ pub fn exact(
         &scene,
         &transport,
         &direct,
-        Bounces::Count(bounces),
+        ReferenceBounces::Count(bounces),
         albedo,
     )?)
 }

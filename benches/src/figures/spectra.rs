@@ -6,6 +6,7 @@ use super::source::FigureSource;
 use crate::canvas::{Anchor, Area, Canvas, Colour, Lettering, PAPER, SERIES};
 use mrt_core::linalg::matrix::Matrix;
 use mrt_dictionary::modular::paths::emission::{emission_basis, emitter_radiosity};
+use mrt_dictionary::modular::paths::ends::PathFrame;
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};
 use mrt_dictionary::progress::Progress;
 
@@ -134,7 +135,8 @@ fn emission(source: &FigureSource) -> Option<Spectrum> {
                 .openings
                 .iter()
                 .map(move |opening| {
-                    emitter_radiosity(shape, opening.face, false, &radiosity, resolution)
+                    let (face, frame) = (opening.face, PathFrame::Upright);
+                    emitter_radiosity(shape, face, frame, &radiosity, resolution)
                 })
                 .collect::<Vec<_>>()
         })

@@ -15,7 +15,8 @@ use mrt_dictionary::config::{Enrichment, PriorConfig};
 use mrt_dictionary::modular::light_prior::warped::{
     warped_direct_samples, warped_light_radius, warped_prior_lights,
 };
-use mrt_dictionary::modular::one_bounce::warped::{WarpedWalls, warped_bounce};
+use mrt_dictionary::modular::one_bounce::warped::warped_bounce;
+use mrt_dictionary::modular::surface::walls::warped::WarpedWalls;
 use mrt_dictionary::modular::transport::warped::{RebuildConfig, rebuilt, regathered};
 use mrt_editor::render::camera::Camera;
 use mrt_editor::render::tone::auto_exposure;

@@ -16,7 +16,7 @@ pub struct Container<'a> {
 impl<'a> Container<'a> {
     /// Checks all of `bytes`, checksums included.
     ///
-    /// Cost: one pass over the bytes. Takes a few dozen bytes a section from `budget`.
+    /// Cost: one pass over the bytes. Takes a few dozen bytes per section from `budget`.
     ///
     /// # Errors
     /// Any [`ContainerError`] but `Io`, `MissingSection` and `InvalidSection`.

@@ -1,8 +1,8 @@
 //! Ray casting against triangle meshes, through obvhs.
 //!
-//! The answers do not depend on the machine or on the shape of the tree: triangles are intersected in
-//! `f64` by exactly rounded operations, boxes are padded beyond the rounding of their own tests, and of
-//! hits at equal distance the triangle of the smallest index wins. Rays through an edge or a vertex that
+//! The answers depend neither on the machine nor on the shape of the tree. Triangles are intersected in
+//! `f64` by exactly rounded operations. Boxes are padded by more than the rounding of their tests. Of hits
+//! at equal distance, the triangle with the smallest index wins. Rays through an edge or a vertex that
 //! triangles share always hit one of them (S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle
 //! Intersection", Journal of Computer Graphics Techniques 2(1), 2013).
 
@@ -14,37 +14,38 @@ use obvhs::bvh2::{Bvh2, builder::build_bvh2, node::Bvh2Node};
 use obvhs::fast_stack;
 use obvhs::ray::{Ray, RayHit};
 
-/// Triangles with a coordinate beyond this are left out: areas of boxes would overflow.
+/// Triangles with a coordinate beyond this are left out, because areas of boxes would overflow.
 pub const MAX_COORDINATE: f32 = 1e15;
 
-/// Triangles in a tree of boxes.
+/// The triangles of a mesh in a tree of boxes.
 pub struct Bvh {
     tree: Bvh2,
-    /// Corners, in the order of the tree's leaves.
+    /// Corners of the triangles, in the order of the tree's leaves.
     corners: Vec<[Vec3; 3]>,
-    /// Index in the mesh of each of these.
+    /// Indices of these triangles in the mesh.
     mesh_triangles: Vec<u32>,
 }
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Index in the mesh.
+    /// Index of the triangle in the mesh.
     pub triangle: u32,
-    /// Distance from the origin in lengths of the direction.
+    /// Distance from the origin, in lengths of the direction.
     pub t: f32,
     /// Weight of the triangle's second corner, in [0, 1].
     pub u: f32,
-    /// Weight of the third corner, in [0, 1]; the first has 1 - u - v.
+    /// Weight of the third corner, in [0, 1]. The first corner has 1 - u - v.
     pub v: f32,
 }
 
 impl Bvh {
-    /// Builds the tree on this thread; about a second for a million triangles.
+    /// Builds the tree, on the calling thread.
     ///
     /// Triangles that no ray can hit are left out: those without area, with a vertex that does not exist,
-    /// or with a coordinate that is not a number or beyond [`MAX_COORDINATE`]. Without any triangle
-    /// every ray misses.
+    /// or with a coordinate that is NaN or beyond [`MAX_COORDINATE`]. Without triangles every ray misses.
+    ///
+    /// Cost: about a second for a million triangles.
     pub fn build(mesh: &TriangleMesh) -> Self {
         let (mut corners, mut mesh_triangles) = (Vec::new(), Vec::new());
         for (index, vertices) in mesh.triangles.iter().enumerate() {
@@ -67,7 +68,7 @@ impl Bvh {
         let parameters = BvhBuildParams::medium_build();
         let mut tree = build_bvh2(&boxes, parameters, &mut std::time::Duration::default());
         if !tree.nodes.is_empty() {
-            // obvhs sizes its traversal stack by this, and builds do not update it.
+            // obvhs sizes its traversal stack by the depth, which the build does not update.
             tree.max_depth = tree.max_depth.max(tree.depth(0) + 1);
         }
         let order = std::mem::take(&mut tree.primitive_indices);
@@ -85,14 +86,14 @@ impl Bvh {
 
     /// The nearest hit with 0 < t < `t_max`, from either side.
     ///
-    /// `direction` need not be of unit length. A ray that starts on a triangle may hit it again at a t of
-    /// rounding: start a little off the surface. Rays should start within about ten sizes of the
-    /// mesh, or they may slip past the edge of a box. A ray that is not finite or has no direction
+    /// `direction` need not have unit length. A ray that starts on a triangle may hit it again at a tiny t,
+    /// so start a little off the surface. Rays should start within about ten sizes of the mesh; from
+    /// farther away they may slip past the edge of a box. A ray that is not finite or has no direction
     /// hits nothing.
     pub fn closest_hit(&self, origin: Vec3, direction: Vec3, t_max: f32) -> Option<Hit> {
         let sheared = ShearedRay::new(origin, direction)?;
         let mut closest: Option<Hit> = None;
-        // obvhs' own closest hit lets the order of the tree choose between equal distances.
+        // In the closest hit of obvhs the order of the tree chooses between equal distances.
         let visit_leaf = |leaf: &Bvh2Node, ray: &mut Ray, _: &mut RayHit| {
             let first = leaf.first_index as usize;
             for k in first..first + leaf.prim_count as usize {
@@ -106,7 +107,7 @@ impl Bvh {
                 };
                 if nearer {
                     closest = Some(Hit { triangle, t, u, v });
-                    // One rounding up, so that a box at the same distance is still opened.
+                    // The next larger number, so that a box at the same distance is still opened.
                     ray.tmax = t.next_up();
                 }
             }
@@ -120,9 +121,8 @@ impl Bvh {
         closest
     }
 
-    /// True if any triangle is hit with 0 < t < `t_max`; stops at the first found.
-    ///
-    /// The same rays hit as in [`Bvh::closest_hit`].
+    /// True if any triangle is hit with 0 < t < `t_max`, which is if [`Bvh::closest_hit`] finds a hit. Stops
+    /// at the first hit.
     pub fn is_occluded(&self, origin: Vec3, direction: Vec3, t_max: f32) -> bool {
         let Some(sheared) = ShearedRay::new(origin, direction) else {
             return false;
@@ -137,12 +137,12 @@ impl Bvh {
     }
 }
 
-/// A ray in the frame where it starts at zero and runs along z (Woop et al., section 3).
+/// A ray, and the shear that makes it start at zero and run along z (Woop et al., section 3).
 struct ShearedRay {
     origin: DVec3,
-    /// The largest component of the direction, then the two others.
+    /// The axis of the direction's largest component, which becomes z, then the two others.
     axes: [usize; 3],
-    /// What z adds to x and y, and the inverse of the largest component.
+    /// The slopes of x and y along z, and the inverse of the largest component.
     shear: DVec3,
 }
 
@@ -168,10 +168,10 @@ impl ShearedRay {
         })
     }
 
-    /// t > 0 and the weights of the second and third corner.
+    /// t > 0 and the weights of the second and third corner, if the triangle is hit.
     ///
-    /// The sign of an edge function is that of a difference of two rounded products of coordinates that
-    /// each corner has alone, so neighbours agree on it: it is right or zero, and zero counts as inside.
+    /// The sign of an edge function is that of a difference of two rounded products. Their factors belong to
+    /// one corner each, so neighbours agree on the sign. It is right or zero, and zero counts as inside.
     fn intersect(&self, corners: &[Vec3; 3]) -> Option<(f32, f32, f32)> {
         let [z, x, y] = self.axes;
         let [a, b, c] = corners.map(|corner| {
@@ -192,7 +192,7 @@ impl ShearedRay {
             return None;
         }
         let sum = opposite_a + opposite_b + opposite_c;
-        // Zero where the ray runs in the triangle's plane.
+        // The sum is zero if the ray runs in the triangle's plane.
         if sum == 0.0 {
             return None;
         }
@@ -204,8 +204,8 @@ impl ShearedRay {
 
 /// The ray for box tests.
 ///
-/// Not `Ray::new`, which takes every component below 1e-7 for 1e-7: a short direction would miss its
-/// boxes. The bound here keeps 0 times the inverse a number.
+/// `Ray::new` would replace every component below 1e-7 by 1e-7, and a short direction would miss its
+/// boxes. The bound here keeps 0 times the inverse from becoming NaN.
 fn box_ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
     let inverse = |x: f32| (1.0 / x).clamp(-1e37, 1e37);
     Ray {
@@ -219,10 +219,10 @@ fn box_ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
 
 /// How far boxes reach beyond their triangles.
 ///
-/// A box test rounds three times, so it errs by 3 * 2^-24 of the distance: 4e-6 of the size of the mesh
-/// covers rays of about ten sizes with both ends in doubt. Far from zero the padding itself must
-/// survive being added to a coordinate. Flat boxes also become solid, which keeps a ray within a
-/// box's face inside.
+/// A box test rounds three times, so it errs by 3 * 2^-24 of the distance. 4e-6 of the size of the mesh
+/// covers rays as long as about ten sizes, with an error at both ends. Far from zero, the padding must also
+/// be large enough to change a coordinate that it is added to. Padding makes flat boxes solid too, so a
+/// ray within the face of a box is inside it.
 fn box_padding(corners: &[[Vec3; 3]]) -> f32 {
     let Some(&[first, ..]) = corners.first() else {
         return 0.0;
@@ -236,6 +236,7 @@ fn box_padding(corners: &[[Vec3; 3]]) -> f32 {
     (4e-6 * size + 2.0 * f32::EPSILON * farthest).max(1e-30)
 }
 
+/// True for triangles that have an area and no coordinate beyond [`MAX_COORDINATE`].
 fn can_be_hit(corners: [Vec3; 3]) -> bool {
     // Written so that NaN fails.
     let in_range = |p: Vec3| p.abs().cmple(Vec3::splat(MAX_COORDINATE)).all();
@@ -248,7 +249,7 @@ mod tests {
     use super::*;
     use crate::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
 
-    /// Deterministic numbers in [-1, 1].
+    /// Fixed pseudo-random numbers in [-1, 1].
     fn noise(k: u32, seed: u32) -> f32 {
         (f64::from(hash(k, seed)) / f64::from(u32::MAX) * 2.0 - 1.0) as f32
     }
@@ -265,13 +266,14 @@ mod tests {
         sphere_from_square(square_from_unit(sobol_point(k, seed))).as_vec3()
     }
 
+    /// `count` random triangles of about the given size, spread over [-1, 1]³.
     fn soup(count: u32, size: f32, seed: u32) -> TriangleMesh {
         let corner = |k: u32| noise_point(k / 3, seed) + size * noise_point(k, seed + 1);
         let triangles = (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
         TriangleMesh::from_triangles((0..3 * count).map(corner).collect(), triangles)
     }
 
-    /// The same answers from all triangles in turn.
+    /// The closest hit from all triangles in turn.
     fn brute_force(mesh: &TriangleMesh, origin: Vec3, direction: Vec3, t_max: f32) -> Option<Hit> {
         let sheared = ShearedRay::new(origin, direction)?;
         let mut closest: Option<Hit> = None;
@@ -341,22 +343,22 @@ mod tests {
         for (k, target) in targets.into_iter().enumerate() {
             let above = target + Vec3::Y;
             assert_like_brute_force(&mesh, &bvh, above, Vec3::NEG_Y, f32::INFINITY);
-            // Straight down on the sheet, its rim and corners included: never between two triangles.
+            // Straight down on the sheet, rim and corners included, no ray passes between triangles.
             let hit = bvh.closest_hit(above, Vec3::NEG_Y, 2.0).unwrap();
             assert_eq!(hit.t, 1.0);
             let origin = noise_point(k as u32, 3) + 2.0 * Vec3::Y;
             assert_like_brute_force(&mesh, &bvh, origin, target - origin, 10.0);
-            // Within the plane of the sheet: no area to hit.
+            // A ray within the plane of the sheet sees no area.
             assert_eq!(bvh.closest_hit(target - Vec3::X, Vec3::X, 9.0), None);
         }
     }
 
     #[test]
-    fn nothing_slips_between_triangles() {
+    fn no_ray_passes_between_triangles() {
         let mesh = floor(9);
         let bvh = Bvh::build(&mesh);
         for k in 0..4000 {
-            // Towards shared edges, from skew origins, so that no coordinate is exact.
+            // Rays aim at shared edges from skew origins, so that no coordinate is exact.
             let triangle = hash(k, 1) as usize % mesh.triangles.len();
             let [a, b, _] = mesh.corners(triangle);
             let target = a.lerp(b, 0.5 + 0.5 * noise(k, 2));
@@ -382,7 +384,7 @@ mod tests {
             if let Some(hit) = bvh.closest_hit(origin, d, f32::INFINITY) {
                 let [a, b, c] = mesh.corners(hit.triangle as usize);
                 let on_triangle = (1.0 - hit.u - hit.v) * a + hit.u * b + hit.v * c;
-                // A few roundings of f32 in numbers up to 3.
+                // A few roundings of `f32` in numbers up to 3.
                 assert!((origin + hit.t * d - on_triangle).length() < 2e-6);
                 hits += 1;
             }
@@ -480,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn extreme_sizes_and_copies_build() {
+    fn meshes_of_extreme_size_and_with_many_copies_are_hit() {
         for scale in [1e-36, 1e-20, 1e14] {
             let mut mesh = soup(200, 0.5, 31);
             for position in &mut mesh.positions {

@@ -1,9 +1,9 @@
 //! The unit cube: its faces, the texel grid on them, and the rotations that map it to itself.
 //!
-//! Texel layout (`docs/CONVENTIONS.md`): a face's texel (row j along v, column i along u) has its
-//! centre at u = (i + 0.5) / resolution, v = (j + 0.5) / resolution, measured from the corner of the
-//! face with the smallest coordinates. u runs along +z, +x, +x and v along +y, +z, +y on the faces
-//! across the x, y and z axis.
+//! Texel layout (`docs/CONVENTIONS.md`): texel (row j along v, column i along u) of a face has its centre
+//! at u = (i + 0.5) / resolution, v = (j + 0.5) / resolution, measured from the corner of the face with
+//! the smallest coordinates. On the faces across the x, y and z axis, u runs along +z, +x and +x, and v
+//! along +y, +z and +y.
 
 use glam::DVec3;
 
@@ -25,7 +25,7 @@ pub enum Face {
 }
 
 impl Face {
-    /// In the order -x, +x, -y, +y, -z, +z.
+    /// All faces, in the order -x, +x, -y, +y, -z, +z.
     pub const ALL: [Face; 6] = [
         Face::NegX,
         Face::PosX,
@@ -50,17 +50,17 @@ impl Face {
         self.index() / 2
     }
 
-    /// True on the side of larger coordinates.
+    /// True for the face at the larger coordinate of its axis.
     pub fn is_positive(self) -> bool {
         self.index() % 2 == 1
     }
 
-    /// The face on the other side.
+    /// The face on the other side of the cube.
     pub fn opposite(self) -> Face {
         Face::ALL[self.index() ^ 1]
     }
 
-    /// Unit vector out of the cube.
+    /// Unit normal out of the cube.
     pub fn outward(self) -> DVec3 {
         let mut normal = DVec3::ZERO;
         normal[self.axis()] = if self.is_positive() { 1.0 } else { -1.0 };
@@ -92,7 +92,7 @@ impl Face {
         self.point((i as f64 + 0.5) * step, (j as f64 + 0.5) * step)
     }
 
-    /// The four corners (0,0), (1,0), (1,1), (0,1) in (u, v) of a rectangle on the face.
+    /// The corners of a rectangle on the face, in the order (u0, v0), (u1, v0), (u1, v1), (u0, v1).
     pub fn rectangle(self, u: [f64; 2], v: [f64; 2]) -> [DVec3; 4] {
         [
             self.point(u[0], v[0]),
@@ -102,7 +102,7 @@ impl Face {
         ]
     }
 
-    /// Index on the face, row by row, of the texel that holds a point of it; points outside count to the
+    /// Index of the texel that contains a point of the face, row by row. A point outside counts to the
     /// nearest texel.
     pub fn texel_index(self, point: DVec3, resolution: usize) -> usize {
         let along = |axis: usize| {
@@ -112,7 +112,7 @@ impl Face {
         along(self.v_axis()) * resolution + along(self.u_axis())
     }
 
-    /// "-x", "+x", ...
+    /// "-x", "+x", "-y", "+y", "-z" or "+z".
     pub fn name(self) -> &'static str {
         ["-x", "+x", "-y", "+y", "-z", "+z"][self.index()]
     }
@@ -120,6 +120,16 @@ impl Face {
     /// Inverse of [`Face::name`].
     pub fn from_name(name: &str) -> Option<Face> {
         Face::ALL.into_iter().find(|face| face.name() == name)
+    }
+
+    /// Where a map of the cube to itself takes this face, if it takes +x, +y and +z to `images`.
+    pub(super) fn image(self, images: [Face; 3]) -> Face {
+        let image = images[self.axis()];
+        if self.is_positive() {
+            image
+        } else {
+            image.opposite()
+        }
     }
 }
 
@@ -152,7 +162,7 @@ impl CubeRotation {
         Some(CubeRotation { images: [x, y, z] })
     }
 
-    /// A rotation about +y by quarter turns that take +z to +x.
+    /// The rotation about +y by a number of quarter turns, each of which takes +z to +x.
     pub fn about_y(quarter_turns: u32) -> CubeRotation {
         let x = [Face::PosX, Face::NegZ, Face::NegX, Face::PosZ][quarter_turns as usize % 4];
         let z = [Face::PosZ, Face::PosX, Face::NegZ, Face::NegX][quarter_turns as usize % 4];
@@ -161,14 +171,14 @@ impl CubeRotation {
         }
     }
 
-    /// The rotation about +y that takes +z to a side direction; `None` for +y and -y.
+    /// The rotation about +y that takes +z to `heading`; `None` for +y and -y.
     pub fn about_y_to(heading: Face) -> Option<CubeRotation> {
         (0..4)
             .map(CubeRotation::about_y)
             .find(|rotation| rotation.face(Face::PosZ) == heading)
     }
 
-    /// All 24.
+    /// All 24 rotations.
     pub fn all() -> impl Iterator<Item = CubeRotation> {
         Face::ALL.into_iter().flat_map(|x| {
             Face::ALL
@@ -177,22 +187,17 @@ impl CubeRotation {
         })
     }
 
-    /// Where a face goes.
+    /// Where the rotation takes a face.
     pub fn face(self, face: Face) -> Face {
-        let image = self.images[face.axis()];
-        if face.is_positive() {
-            image
-        } else {
-            image.opposite()
-        }
+        face.image(self.images)
     }
 
-    /// Where a point of the unit cube goes.
+    /// Where the rotation takes a point of the unit cube.
     pub fn point(self, point: DVec3) -> DVec3 {
         self.direction(point - DVec3::splat(0.5)) + DVec3::splat(0.5)
     }
 
-    /// Where a direction goes.
+    /// Where the rotation takes a direction.
     pub fn direction(self, direction: DVec3) -> DVec3 {
         self.images[0].outward() * direction.x
             + self.images[1].outward() * direction.y
@@ -216,7 +221,7 @@ impl CubeRotation {
         }
     }
 
-    /// The images of +x and +y, as in "+x+y" for the identity.
+    /// The names of the images of +x and +y: "+x+y" for the identity.
     pub fn name(self) -> String {
         format!("{}{}", self.images[0], self.images[1])
     }
@@ -249,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn z_turns_to_every_side_and_to_no_other() {
+    fn a_turn_about_y_takes_z_to_every_side_but_not_up_or_down() {
         for heading in Face::ALL {
             let turned = CubeRotation::about_y_to(heading).map(|r| r.face(Face::PosZ));
             assert_eq!(turned, (heading.axis() != 1).then_some(heading));

@@ -1,11 +1,12 @@
-//! The 48 symmetries of the unit cube: its 24 rotations, and those with a mirror.
+//! The 48 symmetries of the unit cube: its 24 rotations, and each of them with a mirror.
 
 use crate::geometry::cube::{CubeRotation, Face};
 use glam::DVec3;
 
-/// A map of the unit cube to itself: where +x, +y and +z point afterwards.
+/// A rotation or a mirrored rotation that maps the unit cube to itself: one of 48.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct CubeSymmetry {
+    /// Where +x, +y and +z point after the map.
     images: [Face; 3],
 }
 
@@ -15,27 +16,27 @@ impl CubeSymmetry {
         images: [Face::PosX, Face::PosY, Face::PosZ],
     };
 
-    /// The map that takes +x, +y and +z to three directions; `None` unless they are on three axes.
+    /// The map that takes +x, +y and +z to `x`, `y` and `z`; `None` unless they lie on three axes.
     pub fn from_images(x: Face, y: Face, z: Face) -> Option<CubeSymmetry> {
         let axes_differ = x.axis() != y.axis() && y.axis() != z.axis() && z.axis() != x.axis();
         axes_differ.then_some(CubeSymmetry { images: [x, y, z] })
     }
 
-    /// Exchanges two axes (0, 1, 2); the identity if they are the same.
+    /// The map that exchanges two axes (0, 1, 2); the identity if they are the same.
     pub fn exchange(a: usize, b: usize) -> CubeSymmetry {
         let mut images = Self::IDENTITY.images;
         images.swap(a, b);
         CubeSymmetry { images }
     }
 
-    /// Reverses an axis (0, 1, 2).
+    /// The map that reverses an axis (0, 1, 2).
     pub fn mirror(axis: usize) -> CubeSymmetry {
         let mut images = Self::IDENTITY.images;
         images[axis] = images[axis].opposite();
         CubeSymmetry { images }
     }
 
-    /// All 48.
+    /// All 48 maps.
     pub fn all() -> impl Iterator<Item = CubeSymmetry> {
         Face::ALL.into_iter().flat_map(|x| {
             Face::ALL.into_iter().flat_map(move |y| {
@@ -46,17 +47,12 @@ impl CubeSymmetry {
         })
     }
 
-    /// Where a face goes.
+    /// Where the map takes a face.
     pub fn face(self, face: Face) -> Face {
-        let image = self.images[face.axis()];
-        if face.is_positive() {
-            image
-        } else {
-            image.opposite()
-        }
+        face.image(self.images)
     }
 
-    /// Where a direction goes.
+    /// Where the map takes a direction.
     pub fn direction(self, direction: DVec3) -> DVec3 {
         let mut out = DVec3::ZERO;
         for (axis, image) in self.images.into_iter().enumerate() {
@@ -66,9 +62,9 @@ impl CubeSymmetry {
         out
     }
 
-    /// Where a point of the unit cube goes.
+    /// Where the map takes a point of the unit cube.
     ///
-    /// Coordinates are copied or subtracted from one, so texel centres go to texel centres but for rounding.
+    /// Coordinates are copied or subtracted from one, so texel centres go to texel centres, up to rounding.
     pub fn point(self, point: DVec3) -> DVec3 {
         let mut out = DVec3::ZERO;
         for (axis, image) in self.images.into_iter().enumerate() {
@@ -90,14 +86,14 @@ impl CubeSymmetry {
         CubeSymmetry { images }
     }
 
-    /// First `first`, then this one.
+    /// The map that applies `first` and then this one.
     pub fn after(self, first: CubeSymmetry) -> CubeSymmetry {
         CubeSymmetry {
             images: first.images.map(|image| self.face(image)),
         }
     }
 
-    /// True for the 24 that keep left and right apart.
+    /// True for the 24 maps without a mirror.
     pub fn is_rotation(self) -> bool {
         let [x, y, z] = self.images.map(Face::outward);
         x.cross(y) == z
@@ -107,7 +103,7 @@ impl CubeSymmetry {
 impl From<CubeRotation> for CubeSymmetry {
     fn from(rotation: CubeRotation) -> Self {
         CubeSymmetry {
-            images: [Face::PosX, Face::PosY, Face::PosZ].map(|face| rotation.face(face)),
+            images: Self::IDENTITY.images.map(|face| rotation.face(face)),
         }
     }
 }
@@ -117,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn there_are_48_and_half_of_them_rotate() {
+    fn there_are_48_symmetries_and_half_are_rotations() {
         let all: Vec<_> = CubeSymmetry::all().collect();
         assert_eq!(all.len(), 48);
         assert_eq!(all.iter().filter(|s| s.is_rotation()).count(), 24);
@@ -133,7 +129,7 @@ mod tests {
             assert_eq!(a.inverse().after(a), CubeSymmetry::IDENTITY);
             for b in CubeSymmetry::all() {
                 let once = a.after(b).point(p);
-                // One subtraction from one at each step.
+                // Each step rounds once, where it subtracts from one.
                 assert!((once - a.point(b.point(p))).length() < 1e-15);
             }
             let moved = a.point(p) - a.point(DVec3::ZERO);

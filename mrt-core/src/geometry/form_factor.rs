@@ -1,18 +1,18 @@
-//! Form factors from a point to a polygon in closed form, and the polygon clipping that makes
-//! them exact behind openings.
+//! Form factors from a point to a polygon in closed form, and the polygon clipping that makes them exact
+//! behind openings.
 //!
-//! Lambert's formula: the fraction of the cosine-weighted hemisphere over a point that a polygon
-//! covers is a sum over its edges of the angle they subtend times the component of the edge
-//! plane's unit normal along the surface normal. Irradiance from a polygon of uniform radiosity B is
-//! that fraction times B.
+//! Lambert's formula: the fraction of the cosine-weighted hemisphere over a point that a polygon covers
+//! is a sum over its edges. Each edge adds the angle that it subtends, times the component of the unit
+//! normal of its plane through the point along the surface normal, over 2π. Irradiance from a polygon of
+//! uniform radiosity B is that fraction times B.
 
 use glam::DVec3;
 
 /// Fraction of the cosine-weighted hemisphere at `point` around unit `normal` that a planar polygon
 /// covers, in [0, 1].
 ///
-/// The polygon may wind either way; it must lie in the half-space `(x - point) · normal >= 0`
-/// (clip with [`clip_polygon`] first where it may not) and must not contain `point`.
+/// The polygon may wind either way. It must lie in the half-space `(x - point) · normal >= 0` (clip it
+/// with [`clip_polygon`] first where it may not), and must not contain `point`.
 pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let mut sum = 0.0;
     let Some(&last) = polygon.last() else {
@@ -23,7 +23,7 @@ pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
         let to = corner - point;
         let across = from.cross(to);
         let sine = across.length();
-        // An edge that the point lies in line with subtends no area.
+        // An edge in line with the point subtends no angle.
         if sine > 0.0 {
             let angle = libm::atan2(sine, from.dot(to));
             sum += angle * across.dot(normal) / sine;
@@ -33,17 +33,17 @@ pub fn point_to_polygon(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     (sum * (0.5 / std::f64::consts::PI)).abs()
 }
 
-/// An oriented plane through which polygons are cut: the kept side is `normal · x >= offset`.
+/// The side of a plane that clipping keeps: `normal · x >= offset`.
 #[derive(Clone, Copy, Debug)]
 pub struct HalfSpace {
-    /// Into the kept side; need not be of unit length.
+    /// Points into the half-space. It need not have unit length.
     pub normal: DVec3,
-    /// `normal · x` on the plane.
+    /// The value of `normal · x` on the plane.
     pub offset: f64,
 }
 
 impl HalfSpace {
-    /// The half-space whose boundary passes through `point`.
+    /// The half-space with the given normal whose plane passes through `point`.
     pub fn through(point: DVec3, normal: DVec3) -> Self {
         Self {
             normal,
@@ -51,14 +51,14 @@ impl HalfSpace {
         }
     }
 
-    /// Positive inside, in units of `normal`'s length.
+    /// Signed distance of a point from the plane, times the length of `normal`: positive inside.
     pub fn side(&self, point: DVec3) -> f64 {
         self.normal.dot(point) - self.offset
     }
 }
 
-/// The half-spaces of the cone that starts at `apex` and passes through the edges of a convex
-/// `portal`, whose interior is on the kept side.
+/// Fills `cone` with the half-spaces of the cone that starts at `apex` and passes through the edges of a
+/// convex `portal`. The interior of the portal is on the kept side of each.
 ///
 /// Edges shorter than rounding, or in line with the apex, bound nothing and are left out.
 pub fn cone_through(apex: DVec3, portal: &[DVec3], cone: &mut Vec<HalfSpace>) {
@@ -77,8 +77,8 @@ pub fn cone_through(apex: DVec3, portal: &[DVec3], cone: &mut Vec<HalfSpace>) {
     }
 }
 
-/// Cuts a convex polygon by a half-space (Sutherland and Hodgman), leaving the kept part in
-/// `polygon`; `scratch` is overwritten.
+/// Cuts a convex polygon by a half-space (Sutherland and Hodgman). `polygon` becomes the part inside;
+/// `scratch` is overwritten.
 pub fn clip_polygon(polygon: &mut Vec<DVec3>, half_space: &HalfSpace, scratch: &mut Vec<DVec3>) {
     scratch.clear();
     let Some(&last) = polygon.last() else {
@@ -122,13 +122,14 @@ mod tests {
 
     #[test]
     fn opposite_faces_of_a_cube_match_the_closed_form() {
-        // F = 2/pi (ln sqrt(4/3) + 2 sqrt2 atan(1/sqrt2) - pi/2) for unit squares at distance 1;
-        // the midpoint rule over 40² points is off by under 1e-4.
+        // For unit squares at distance 1: F = 2/π (ln √(4/3) + 2 √2 atan(1/√2) - π/2). The midpoint rule
+        // over 40² points errs by less than 1e-4.
         let exact = 2.0 / std::f64::consts::PI
             * ((4.0f64 / 3.0).sqrt().ln() + 2.0 * 2f64.sqrt() * (1.0 / 2f64.sqrt()).atan()
                 - std::f64::consts::FRAC_PI_2);
         assert!((face_to_face(Face::PosZ) - exact).abs() < 1e-4);
-        // The rest goes to the four sides in equal parts; their factor has a kink at the shared edge.
+        // The rest goes to the four sides in equal parts. Their factor has a kink at the shared edge, so
+        // the midpoint rule errs more.
         assert!((face_to_face(Face::PosX) - (1.0 - exact) / 4.0).abs() < 1e-3);
     }
 

@@ -3,11 +3,11 @@
 use crate::geometry::cube::Face;
 use glam::{DMat3, DVec3};
 
-/// Eight corners; corner k belongs to the point of the unit cube with x = bit 0, y = bit 1 and
+/// A warped cube. Corner k is the image of the point of the unit cube with x = bit 0, y = bit 1 and
 /// z = bit 2 of k.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hexahedron {
-    /// World positions.
+    /// World positions of the corners.
     pub corners: [DVec3; 8],
 }
 
@@ -20,7 +20,7 @@ pub enum HexahedronError {
         /// Which corner.
         corner: usize,
     },
-    /// The map folds over, is mirrored or has no volume at a corner.
+    /// At a corner the map folds over, is mirrored or has no volume.
     #[error(
         "the warp has volume factor {found:.3e} at corner {corner}; expected above {expected:.3e} \
          (corners in the wrong order, mirrored, folded or flat)"
@@ -30,18 +30,18 @@ pub enum HexahedronError {
         corner: usize,
         /// Smallest accepted determinant of the Jacobian.
         expected: f64,
-        /// Determinant of the Jacobian there.
+        /// Determinant of the Jacobian at the corner.
         found: f64,
     },
 }
 
 impl Hexahedron {
-    /// The cell [x, x+1] x [y, y+1] x [z, z+1].
+    /// The unit cell whose smallest corner is `min`.
     pub fn cell(min: DVec3) -> Self {
         Self::cuboid(min, min + DVec3::ONE)
     }
 
-    /// An axis-aligned box.
+    /// The axis-aligned box from `min` to `max`.
     pub fn cuboid(min: DVec3, max: DVec3) -> Self {
         Self {
             corners: std::array::from_fn(|k| {
@@ -56,21 +56,21 @@ impl Hexahedron {
         DVec3::new((k & 1) as f64, (k >> 1 & 1) as f64, (k >> 2 & 1) as f64)
     }
 
-    /// Checks that all corners are finite and that the map is right-handed and unfolded at each.
+    /// Checks that all corners are finite, and that the map is right-handed and unfolded at each.
     ///
     /// # Errors
-    /// [`HexahedronError`], with the first corner at fault.
+    /// [`HexahedronError`], for the first corner at fault.
     pub fn check(&self) -> Result<(), HexahedronError> {
         if let Some(corner) = self.corners.iter().position(|c| !c.is_finite()) {
             return Err(HexahedronError::NotFinite { corner });
         }
         let size = self.diagonal();
-        // A millionth of the volume of the cube on the diagonal: flatter is a mistake, and leaves
-        // the inverse map too few digits.
+        // A millionth of the volume of the cube on the diagonal. A flatter block is a mistake, and its
+        // inverse map would have too few digits.
         let expected = 1e-6 * size * size * size;
         for corner in 0..8 {
             let found = self.jacobian(Self::unit_corner(corner)).determinant();
-            // Also true when huge coordinates make the determinant NaN.
+            // Written so that NaN, from huge coordinates, counts as folded.
             let is_unfolded = found > expected;
             if !is_unfolded {
                 return Err(HexahedronError::Folded {
@@ -89,7 +89,7 @@ impl Hexahedron {
         (max - min).length()
     }
 
-    /// Axis-aligned bounds (smallest, largest).
+    /// Smallest and largest coordinates of the corners.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let first = self.corners[0];
         self.corners
@@ -111,7 +111,7 @@ impl Hexahedron {
         sum
     }
 
-    /// Derivatives of [`Hexahedron::point`] by x, y and z, as columns.
+    /// Derivatives of [`Hexahedron::point`] by the x, y and z of the unit cube, as columns.
     pub fn jacobian(&self, unit: DVec3) -> DMat3 {
         let mut columns = [DVec3::ZERO; 3];
         for (k, &corner) in self.corners.iter().enumerate() {
@@ -131,8 +131,8 @@ impl Hexahedron {
         DMat3::from_cols(columns[0], columns[1], columns[2])
     }
 
-    /// The point of the unit cube (or outside it) that maps to `world`, by Newton's method; `None`
-    /// where it does not converge, which happens far outside a warped block.
+    /// The point in or outside the unit cube that maps to `world`, by Newton's method; `None` where the
+    /// method does not converge, which happens far outside a warped block.
     pub fn inverse(&self, world: DVec3) -> Option<DVec3> {
         let size = self.diagonal();
         let mut unit = DVec3::splat(0.5);
@@ -145,7 +145,7 @@ impl Hexahedron {
             if jacobian.determinant() == 0.0 {
                 return None;
             }
-            // Steps are limited so that a far-away start cannot jump into a folded region.
+            // Limited steps cannot jump from far away into a folded region.
             let step = jacobian.inverse() * miss;
             unit -= step.clamp(DVec3::splat(-2.0), DVec3::splat(2.0));
             if !unit.is_finite() {
@@ -156,7 +156,7 @@ impl Hexahedron {
         (miss.length() <= 1e-9 * size).then_some(unit)
     }
 
-    /// True when `world` is inside, or within `tolerance` (in unit-cube coordinates) of it.
+    /// True if `world` is inside the block, or within `tolerance` of it in unit-cube coordinates.
     pub fn contains(&self, world: DVec3, tolerance: f64) -> bool {
         let (min, max) = self.bounds();
         let slack = DVec3::splat(tolerance * self.diagonal());
@@ -169,7 +169,7 @@ impl Hexahedron {
         })
     }
 
-    /// World corners (0,0), (1,0), (1,1), (0,1) in (u, v) of a face.
+    /// World corners of a face, in the order (u, v) = (0, 0), (1, 0), (1, 1), (0, 1).
     pub fn face_corners(&self, face: Face) -> [DVec3; 4] {
         face.rectangle([0.0, 1.0], [0.0, 1.0])
             .map(|unit| self.point(unit))
@@ -178,12 +178,13 @@ impl Hexahedron {
     /// Unit normal into the block at (u, v) of a face.
     pub fn face_normal(&self, face: Face, u: f64, v: f64) -> DVec3 {
         let jacobian = self.jacobian(face.point(u, v));
-        // A gradient of the unit coordinate transforms by the inverse transpose, which keeps its
-        // side of the face.
+        // The gradient of a unit coordinate transforms by the inverse transpose, and stays on its side
+        // of the face.
         let inward = jacobian.inverse().transpose() * -face.outward();
         inward.normalize()
     }
 
+    /// The weight of corner k at a point of the unit cube.
     fn weight(k: usize, unit: DVec3) -> f64 {
         let bits = Self::unit_corner(k);
         (0..3)
@@ -203,6 +204,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// A cell with the corners moved by the given offsets, x, y and z of each.
     fn warped(offsets: &[f64]) -> Hexahedron {
         let mut block = Hexahedron::cell(DVec3::new(2.0, -1.0, 5.0));
         for (corner, offset) in block.corners.iter_mut().zip(offsets.chunks_exact(3)) {

@@ -1,14 +1,14 @@
-//! Triangle meshes: what a mesh file holds once it is read, checked and in our axes.
+//! Triangle meshes: data, checks, cleaning, normals and transforms.
 //!
-//! Triangles wind counterclockwise seen from the side their normal points to. Derived quantities are
+//! Triangles wind counterclockwise seen from the side that their normal points to. Derived quantities are
 //! computed in `f64` and rounded once.
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-/// What a triangle is painted with.
+/// The material of a triangle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
-    /// As in the file it came from.
+    /// The name in the file that it came from.
     pub name: String,
     /// Diffuse reflectance, linear RGB, each in [0, 1].
     pub albedo: Vec3,
@@ -19,17 +19,17 @@ pub struct Material {
 pub struct TriangleMesh {
     /// Positions of the vertices.
     pub positions: Vec<Vec3>,
-    /// Three vertices a triangle.
+    /// Vertices of the triangles, as indices into `positions`.
     pub triangles: Vec<[u32; 3]>,
-    /// Unit normals, one a vertex, where the mesh brings its own.
+    /// One unit normal for each vertex, if the mesh has normals of its own.
     pub normals: Option<Vec<Vec3>>,
-    /// Index into `materials`, one a triangle.
+    /// One index into `materials` for each triangle.
     pub triangle_materials: Vec<u32>,
     /// The materials.
     pub materials: Vec<Material>,
 }
 
-/// Why a mesh makes no sense, as opposed to being untidy.
+/// Why a mesh is not valid. Untidy meshes are valid, and [`clean`] tidies them.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MeshError {
     /// A triangle names a vertex that does not exist.
@@ -37,9 +37,9 @@ pub enum MeshError {
     VertexOutOfRange {
         /// Which triangle.
         triangle: usize,
-        /// The vertex it names.
+        /// The vertex that it names.
         found: u32,
-        /// How many there are.
+        /// Number of vertices.
         vertex_count: usize,
     },
     /// A triangle names a material that does not exist.
@@ -47,9 +47,9 @@ pub enum MeshError {
     MaterialOutOfRange {
         /// Which triangle.
         triangle: usize,
-        /// The material it names.
+        /// The material that it names.
         found: u32,
-        /// How many there are.
+        /// Number of materials.
         material_count: usize,
     },
     /// An albedo is not a number in [0, 1].
@@ -72,27 +72,27 @@ pub enum MeshError {
     },
 }
 
-/// What [`clean`] dropped and what it found.
+/// What [`clean`] found, and which of it was dropped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MeshReport {
-    /// Vertices with a coordinate that is infinite or not a number; dropped.
+    /// Vertices with an infinite or NaN coordinate. Dropped.
     pub not_finite_vertices: usize,
-    /// Triangles on such a vertex; dropped.
+    /// Triangles with a vertex that is not finite. Dropped.
     pub not_finite_triangles: usize,
-    /// Triangles without area; dropped.
+    /// Triangles without area. Dropped.
     pub degenerate_triangles: usize,
-    /// Finite vertices that no triangle is left to use; dropped.
+    /// Finite vertices that no kept triangle uses. Dropped.
     pub unused_vertices: usize,
-    /// Normals of kept vertices that are zero or not finite; if there are any, all normals are dropped.
+    /// Normals of kept vertices that are zero or not finite. If there are any, all normals are dropped.
     pub invalid_normals: usize,
-    /// Edges with three or more triangles; kept. Vertices at the same place count as one.
+    /// Edges with three or more triangles. Kept. Vertices at the same position count as one.
     pub non_manifold_edges: usize,
-    /// Edges with one triangle, where the surface ends; kept. None in a closed mesh.
+    /// Edges with one triangle, where the surface ends. Kept. A closed mesh has none.
     pub boundary_edges: usize,
 }
 
 impl TriangleMesh {
-    /// Bare triangles of one grey material of albedo 0.5.
+    /// Triangles without normals, all of one grey material of albedo 0.5.
     pub fn from_triangles(positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Self {
         Self {
             triangle_materials: vec![0; triangles.len()],
@@ -109,7 +109,7 @@ impl TriangleMesh {
     /// The three corners of a triangle.
     ///
     /// # Panics
-    /// If there is no such triangle, or it names a vertex that does not exist.
+    /// If the triangle or one of its vertices does not exist.
     pub fn corners(&self, triangle: usize) -> [Vec3; 3] {
         self.triangles[triangle].map(|vertex| self.positions[vertex as usize])
     }
@@ -118,7 +118,7 @@ impl TriangleMesh {
 /// Checks that all indices and lengths fit and that albedos are in range.
 ///
 /// # Errors
-/// [`MeshError`], the first in the order of the arrays.
+/// [`MeshError`], for the first fault in the order of the arrays.
 pub fn check(mesh: &TriangleMesh) -> Result<(), MeshError> {
     let length = |what, expected, found| {
         let error = MeshError::WrongLength {
@@ -173,9 +173,11 @@ pub fn check(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
-/// A copy without triangles that have no area or no finite position, and without vertices that none
-/// uses; the order of the rest is kept, and so are all materials. Normals are brought to unit length; if
-/// one that is left has no direction, all are dropped ([`with_smooth_normals`] makes new ones).
+/// A copy without triangles that have no area or a position that is not finite, and without unused
+/// vertices. The rest keeps its order, and all materials are kept.
+///
+/// Normals are brought to unit length. If a normal that is left has no direction, all normals are dropped
+/// ([`with_smooth_normals`] makes new ones).
 ///
 /// # Errors
 /// Those of [`check`].
@@ -233,7 +235,7 @@ pub fn clean(mesh: &TriangleMesh) -> Result<(TriangleMesh, MeshReport), MeshErro
     Ok((cleaned, report))
 }
 
-/// Unit normals, one a triangle; zero for triangles without area.
+/// The unit normal of each triangle; zero for triangles without area.
 pub fn face_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
     area_normals(mesh)
         .into_iter()
@@ -241,22 +243,23 @@ pub fn face_normals(mesh: &TriangleMesh) -> Vec<Vec3> {
         .collect()
 }
 
-/// Areas of the triangles.
+/// The area of each triangle.
 pub fn areas(mesh: &TriangleMesh) -> Vec<f64> {
     area_normals(mesh).into_iter().map(|n| n.length()).collect()
 }
 
-/// Unit normals for the three corners of each triangle: the mean, weighted by area, of the normals of
-/// those triangles around the corner's position that lie within `crease_angle_rad` of this one's.
+/// Unit normals for the three corners of each triangle.
 ///
-/// At 0 every triangle is flat, at π all are smooth. Vertices at the same place count as one, so seams of
-/// split vertices do not show. Where nothing is left of the mean the triangle's own normal stands.
+/// A corner's normal is the mean, weighted by area, of the normals of triangles that meet at its position
+/// and whose normals lie within `crease_angle_rad` of this triangle's. At an angle of 0 every triangle is
+/// flat, at π all are smooth. Vertices at the same position count as one, so seams of split vertices do
+/// not show. Where the mean vanishes, the corner has the normal of its triangle.
 ///
 /// Cost: the sum over positions of the square of the number of triangles that meet there.
 pub fn corner_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> Vec<[Vec3; 3]> {
     let area_normals = area_normals(mesh);
     let unit_normals: Vec<DVec3> = area_normals.iter().map(|n| n.normalize_or_zero()).collect();
-    // Neighbours in one plane must pass at angle 0 in spite of rounding.
+    // Neighbours in one plane must pass at an angle of 0, in spite of rounding.
     let least_cosine = libm::cos(crease_angle_rad) - 1e-12;
     let place = first_vertex_at_each_place(mesh);
     let mut start = vec![0; mesh.positions.len() + 1];
@@ -288,12 +291,12 @@ pub fn corner_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> Vec<[Vec3; 
         .collect()
 }
 
-/// A copy whose vertices carry the normals of [`corner_normals`]; a vertex is split where its corners
+/// A copy with the normals of [`corner_normals`]. A vertex is split where the normals of its corners
 /// differ.
 pub fn with_smooth_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> TriangleMesh {
     let mut positions = Vec::with_capacity(mesh.positions.len());
     let mut normals: Vec<Vec3> = Vec::with_capacity(mesh.positions.len());
-    // New vertices of each old one; nearly always one or two.
+    // By old vertex: the new ones. There are nearly always one or two.
     let mut copies: Vec<Vec<u32>> = vec![Vec::new(); mesh.positions.len()];
     let mut triangles = mesh.triangles.clone();
     let corner_normals = corner_normals(mesh, crease_angle_rad);
@@ -318,20 +321,21 @@ pub fn with_smooth_normals(mesh: &TriangleMesh, crease_angle_rad: f64) -> Triang
     }
 }
 
-/// Smallest and largest coordinates of all vertices; `None` without vertices.
+/// Smallest and largest coordinates of all vertices; `None` if there are no vertices.
 pub fn bounds(mesh: &TriangleMesh) -> Option<[Vec3; 2]> {
     let first = *mesh.positions.first()?;
     let all = mesh.positions.iter();
     Some(all.fold([first; 2], |[low, high], &p| [low.min(p), high.max(p)]))
 }
 
-/// Takes coordinates with z up to ours with y up; x stays, and so does right-handedness.
+/// Takes coordinates with z up to coordinates with y up. The x axis and the handedness stay.
 pub const Y_UP_FROM_Z_UP: DMat3 = DMat3::from_cols(DVec3::X, DVec3::NEG_Z, DVec3::Y);
 
-/// Moves, turns and scales a mesh. Normals go with the inverse transpose; under a mirror image triangles
-/// wind the other way, so that outsides stay outside.
+/// Moves, turns and scales a mesh.
 ///
-/// A scale is `DAffine3::from_scale`, a change of axes `DAffine3::from_mat3(Y_UP_FROM_Z_UP)`.
+/// Normals transform by the inverse transpose. A transform with a mirror reverses the winding of the
+/// triangles, so that outsides stay outside. A scale is `DAffine3::from_scale`, a change of axes
+/// `DAffine3::from_mat3(Y_UP_FROM_Z_UP)`.
 pub fn transform(mesh: &mut TriangleMesh, transform: &DAffine3) {
     for position in &mut mesh.positions {
         *position = transform.transform_point3(position.as_dvec3()).as_vec3();
@@ -339,7 +343,7 @@ pub fn transform(mesh: &mut TriangleMesh, transform: &DAffine3) {
     let [x, y, z] = [0, 1, 2].map(|k| transform.matrix3.col(k));
     let determinant = x.cross(y).dot(z);
     if let Some(normals) = &mut mesh.normals {
-        // The cofactor matrix is the inverse transpose times the determinant, and never divides.
+        // The cofactor matrix is the inverse transpose times the determinant, without its division.
         let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
         for normal in normals {
             let turned = cofactors * normal.as_dvec3() * determinant.signum();
@@ -353,29 +357,30 @@ pub fn transform(mesh: &mut TriangleMesh, transform: &DAffine3) {
     }
 }
 
-/// True where a triangle's height over its longest side is lost in the rounding of positions.
+/// True if a triangle's height over its longest side is lost in the rounding of positions.
 fn is_degenerate(corners: [Vec3; 3]) -> bool {
     let [a, b, c] = corners.map(|corner| corner.as_dvec3());
     let longest = (b - a)
         .length_squared()
         .max((c - b).length_squared())
         .max((a - c).length_squared());
-    // Height over length of 1e-7 is one rounding of f32.
+    // A height of 1e-7 times the side is one rounding of `f32`.
     area_normal([a, b, c]).length() * 2.0 <= 1e-7 * longest
 }
 
-/// The normal times the area.
+/// Normal of a triangle, with the area as its length.
 fn area_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     0.5 * (b - a).cross(c - a)
 }
 
+/// [`area_normal`] of each triangle.
 fn area_normals(mesh: &TriangleMesh) -> Vec<DVec3> {
     (0..mesh.triangles.len())
         .map(|t| area_normal(mesh.corners(t).map(|corner| corner.as_dvec3())))
         .collect()
 }
 
-/// For each vertex the first one at the same position; -0 and 0 are the same.
+/// For each vertex, the first vertex at the same position. -0 and 0 are the same.
 fn first_vertex_at_each_place(mesh: &TriangleMesh) -> Vec<u32> {
     // Adding zero turns -0 into 0.
     let key = |v: u32| {
@@ -398,7 +403,7 @@ fn first_vertex_at_each_place(mesh: &TriangleMesh) -> Vec<u32> {
     first
 }
 
-/// How many triangles each edge has, in no particular order of edges.
+/// Number of triangles of each edge, in no particular order of edges.
 fn edge_triangle_counts(mesh: &TriangleMesh) -> Vec<usize> {
     let place = first_vertex_at_each_place(mesh);
     let mut edges = Vec::with_capacity(mesh.triangles.len() * 3);
@@ -415,7 +420,7 @@ mod tests {
     use super::*;
     use std::f64::consts::{FRAC_PI_2, PI};
 
-    /// The unit cube, closed, two triangles a side, normals outwards.
+    /// The closed unit cube: two triangles a side, normals outwards.
     fn cube() -> TriangleMesh {
         let corner = |k: u32| Vec3::new((k & 1) as f32, (k >> 1 & 1) as f32, (k >> 2 & 1) as f32);
         let quads = [
@@ -434,7 +439,7 @@ mod tests {
     }
 
     #[test]
-    fn a_closed_cube_is_clean() {
+    fn cleaning_changes_nothing_in_a_closed_cube() {
         let (cleaned, report) = clean(&cube()).unwrap();
         assert_eq!(cleaned, cube());
         assert_eq!(report, MeshReport::default());
@@ -448,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_dirt_is_dropped_and_counted() {
+    fn every_kind_of_fault_is_dropped_and_counted() {
         let mut mesh = cube();
         mesh.positions.insert(0, Vec3::splat(9.0));
         for vertex in mesh.triangles.iter_mut().flatten() {
@@ -458,7 +463,7 @@ mod tests {
         mesh.positions.push(Vec3::new(0.0, f32::NEG_INFINITY, 0.0));
         mesh.positions.push(Vec3::splat(0.1));
         mesh.positions.push(Vec3::splat(0.3));
-        // Two with a bad vertex, one that repeats a vertex, one whose corners are in line but for
+        // Two triangles with a bad vertex, one that repeats a vertex, one whose corners are in line up to
         // rounding, and a fin on an edge of the cube and a diagonal of a side.
         mesh.triangles
             .extend([[1, 2, 9], [10, 2, 3], [4, 4, 5], [1, 11, 12], [1, 2, 8]]);
@@ -483,7 +488,7 @@ mod tests {
     }
 
     #[test]
-    fn normals_are_made_unit_or_dropped() {
+    fn normals_are_brought_to_unit_length_or_dropped() {
         let mut mesh = cube();
         mesh.normals = Some(vec![Vec3::new(0.0, 3.0, 0.0); 8]);
         let (cleaned, report) = clean(&mesh).unwrap();
@@ -499,7 +504,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_by_name() {
+    fn meshes_that_are_not_valid_are_refused_by_name() {
         let mut mesh = cube();
         mesh.triangles[3][1] = 8;
         let expected = MeshError::VertexOutOfRange {
@@ -537,7 +542,7 @@ mod tests {
     }
 
     #[test]
-    fn an_open_cube_has_a_boundary_and_split_vertices_do_not() {
+    fn an_open_cube_has_a_boundary_and_a_seam_of_split_vertices_has_none() {
         let mut open = cube();
         open.triangles.truncate(10);
         open.triangle_materials.truncate(10);
@@ -558,7 +563,7 @@ mod tests {
         }
         let smooth = with_smooth_normals(&cube(), PI);
         assert_eq!(smooth.positions.len(), 8);
-        // Every corner of the cube has one or two triangles of equal area from each of three sides.
+        // At every corner of the cube meet one or two triangles of equal area from each of three sides.
         for (normal, position) in smooth.normals.unwrap().iter().zip(&smooth.positions) {
             let outward = (*position - Vec3::splat(0.5)).normalize();
             assert!(normal.dot(outward) > 0.9, "{normal} at {position}");
@@ -567,7 +572,7 @@ mod tests {
 
     #[test]
     fn smooth_normals_are_weighted_by_area() {
-        // Two triangles that share an edge at a right angle, one of three times the area.
+        // Two triangles share an edge at a right angle. One has three times the area of the other.
         let positions = vec![Vec3::ZERO, Vec3::X, Vec3::new(0.0, 3.0, 0.0), Vec3::Z];
         let mesh = TriangleMesh::from_triangles(positions, vec![[0, 1, 2], [0, 3, 1]]);
         let normals = corner_normals(&mesh, PI);

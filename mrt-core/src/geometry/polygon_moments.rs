@@ -1,26 +1,28 @@
-//! Moments over the solid angle of a planar polygon, in closed form: the integrals of 1, ω and ω ωᵀ
-//! over the directions ω in which a point sees it. They carry the first three bands of the spherical
-//! harmonics of a uniformly bright polygon, and turn with the frame as a vector and a matrix do.
+//! Moments over the solid angle of a planar polygon, in closed form: the integrals of 1, ω and ω ωᵀ over
+//! the directions ω in which a point sees the polygon. They determine the first three bands of the
+//! spherical harmonics of a uniformly bright polygon, and rotate as a vector and a matrix do.
 //!
 //! Source: J. Arvo, "Applications of Irradiance Tensors to the Simulation of Non-Lambertian Phenomena",
-//! SIGGRAPH 1995: Stokes' theorem brings each moment down to the one two orders below and a sum over
-//! the edges. With n the unit normal of an edge's great circle, into the polygon, θ the angle that the
-//! edge subtends and s the integral of ω along its arc,
+//! SIGGRAPH 1995. Stokes' theorem reduces each moment to the one two orders below and a sum over the
+//! edges. Let n be the unit normal of an edge's great circle, pointing into the polygon, θ the angle that
+//! the edge subtends, and s the integral of ω along its arc. Then
 //!
 //! ```text
 //! 2 ∫ω dω = Σ θ n          3 ∫ω ωᵀ dω = I ∫dω + Σ s nᵀ
 //! ```
 //!
-//! The solid angle is from A. van Oosterom and J. Strackee, "The Solid Angle of a Plane Triangle",
-//! IEEE Trans. Biomed. Eng. 1983. The sums cancel for small polygons: terms as large as the
-//! polygon's angular size leave a result as large as its square. Below `SMALL` a quadrature
-//! takes over, which has no such loss.
+//! The solid angle is from A. van Oosterom and J. Strackee, "The Solid Angle of a Plane Triangle", IEEE
+//! Trans. Biomed. Eng. 1983. The sums cancel for small polygons: terms as large as the polygon's angular
+//! size leave a result as large as the square of that size. So below the size `SMALL` a quadrature, which
+//! loses no digits, takes over.
 
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Ratio of a polygon's size to its distance below which it is integrated by quadrature. There both
-/// ways err by about 1e-13, the sums by rounding and the quadrature by its sixth power.
+/// Ratio of a polygon's size to its distance below which it is integrated by quadrature.
+///
+/// At this ratio both ways err by about 1e-13: the sums by rounding, the quadrature by the sixth power of
+/// the ratio.
 const SMALL: f64 = 1.0 / 128.0;
 
 /// Integrals over the solid angle that a polygon covers.
@@ -30,13 +32,24 @@ pub struct Moments {
     pub solid_angle: f64,
     /// ∫ ω dω.
     pub first: DVec3,
-    /// ∫ ωᵢ ωⱼ dω in the order xx, yy, zz, xy, yz, zx. The first three add up to the solid angle.
+    /// ∫ ωᵢ ωⱼ dω, in the order xx, yy, zz, xy, yz, zx. The first three add up to the solid angle.
     pub second: [f64; 6],
 }
 
 impl Moments {
-    /// Adds the moments of `other` times `weight`: with radiances as weights, sums over many polygons
-    /// are the moments of the light that they send.
+    /// The moments of one steradian of light from a unit `direction`.
+    #[cfg(test)]
+    pub(crate) fn of_direction(direction: DVec3) -> Moments {
+        let DVec3 { x, y, z } = direction;
+        Moments {
+            solid_angle: 1.0,
+            first: direction,
+            second: [x * x, y * y, z * z, x * y, y * z, z * x],
+        }
+    }
+
+    /// Adds the moments of `other` times `weight`. With radiances as weights, sums over many polygons are
+    /// the moments of the light that they send.
     pub fn add(&mut self, other: &Moments, weight: f64) {
         self.solid_angle += weight * other.solid_angle;
         self.first += other.first * weight;
@@ -70,8 +83,8 @@ impl Moments {
         }
     }
 
-    /// ∫ Y dω of the nine functions of [`crate::lighting::sh`] with l <= 2: the coefficients of radiance 1 that comes
-    /// from the polygon.
+    /// ∫ Y dω of the nine functions Y of [`sh`](crate::lighting::sh) with l <= 2: the coefficients of
+    /// radiance 1 from the polygon.
     pub fn sh9(&self) -> [f64; 9] {
         let [xx, yy, zz, xy, yz, zx] = self.second;
         let constant = (0.25 / PI).sqrt();
@@ -92,9 +105,9 @@ impl Moments {
         ]
     }
 
-    /// Fraction of the cosine-weighted hemisphere around unit `normal` that the polygon covers:
-    /// [`crate::geometry::form_factor::point_to_polygon`] where it lies wholly above the horizon. The part below
-    /// counts as negative.
+    /// Fraction of the cosine-weighted hemisphere around unit `normal` that the polygon covers. A part
+    /// below the horizon counts as negative; without one, this is
+    /// [`point_to_polygon`](crate::geometry::form_factor::point_to_polygon).
     pub fn irradiance_factor(&self, normal: DVec3) -> f64 {
         self.first.dot(normal) / PI
     }
@@ -102,21 +115,21 @@ impl Moments {
 
 /// The moments of a planar convex polygon seen from `point`.
 ///
-/// The polygon may wind either way and have repeated or collinear corners; with fewer than three it
-/// has no moments. It must not contain `point`; where it does, the results are finite and mean nothing.
+/// The polygon may wind either way, and may have repeated or collinear corners. With fewer than three
+/// corners its moments are zero. It must not contain `point`: the results would be finite but meaningless.
 ///
-/// Errors relative to each moment's own length were at most 1e-12 in polygons of every size, from
-/// 1e-8 of their distance to larger than it, seen under more than 10 degrees. Seen from the height h
-/// over their plane or over an edge, in units of the nearest corner's distance, rounding costs a few
-/// times 1e-16 / h; rounding of the corners alone costs as much.
+/// Measured errors, relative to each moment's own length, were at most 1e-12. The polygons had sizes from
+/// 1e-8 of their distance to more than it, and were seen under more than 10 degrees. From a height h over
+/// the plane or over an edge, in units of the nearest corner's distance, rounding adds an error of a few
+/// times 1e-16 / h; rounding the corners alone adds as much.
 ///
-/// Cost: an arc tangent for each edge and one more, or, if the polygon is small and far, seven square
-/// roots for each corner but two: about 290 and 180 ns for a square.
+/// Cost: an arc tangent for each edge and one more, about 290 ns for a square. For a small and far
+/// polygon: seven square roots for each corner but two, about 180 ns for a square.
 pub fn polygon_moments(point: DVec3, polygon: &[DVec3]) -> Moments {
     if polygon.len() < 3 {
         return Moments::default();
     }
-    // The nearest corner loses the fewest digits when the point is subtracted.
+    // Subtracting the point from the nearest corner loses the fewest digits.
     let (mut nearest, mut distance_squared) = (0, f64::INFINITY);
     for (k, &corner) in polygon.iter().enumerate() {
         let candidate = (corner - point).length_squared();
@@ -137,21 +150,39 @@ pub fn polygon_moments(point: DVec3, polygon: &[DVec3]) -> Moments {
     positive
 }
 
+/// A corner of a polygon, as it is seen.
+#[derive(Clone, Copy)]
+struct Corner {
+    position: DVec3,
+    /// From the point that it is seen from.
+    offset: DVec3,
+    /// 1 / length of the offset.
+    inverse: f64,
+    /// The offset at unit length.
+    direction: DVec3,
+}
+
+impl Corner {
+    fn new(point: DVec3, position: DVec3) -> Self {
+        let offset = position - point;
+        let inverse = inverse_length(offset);
+        Self {
+            position,
+            offset,
+            inverse,
+            direction: offset * inverse,
+        }
+    }
+}
+
 /// Moments with the sign of the winding, by sums over the edges.
 fn closed_form(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
-    let apex = polygon[nearest];
-    let to_apex = apex - point;
-    let inverse_apex = inverse_length(to_apex);
-    let apex_direction = to_apex * inverse_apex;
-
-    let mut first = DVec3::ZERO;
-    let mut second = [0.0; 6];
-    // Half the solid angle is the argument of a product with a factor for each triangle of the fan
-    // around the apex; it is less than π for the whole polygon.
+    let apex = Corner::new(point, polygon[nearest]);
+    let mut sums = Moments::default();
+    // Half the solid angle is the argument of a product of complex numbers, one for each triangle of the
+    // fan around the apex. For the whole polygon it is less than π.
     let (mut real, mut imaginary) = (1.0, 0.0);
-
-    let mut from_corner = apex;
-    let (mut from, mut from_inverse, mut from_direction) = (to_apex, inverse_apex, apex_direction);
+    let mut from = apex;
     let mut next = nearest;
     for step in 0..polygon.len() {
         next = if next + 1 == polygon.len() {
@@ -159,64 +190,71 @@ fn closed_form(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
         } else {
             next + 1
         };
-        let to_corner = polygon[next];
-        let to = to_corner - point;
-        let to_inverse = inverse_length(to);
-        let to_direction = to * to_inverse;
-
-        // The cross product of both ends, with the shorter one and the edge itself in place of
-        // differences of long vectors.
-        let shorter = if from_inverse > to_inverse { from } else { to };
-        let across = shorter.cross(to_corner - from_corner);
-        let sine = across.length();
-        // An edge that the point lies in line with subtends no area.
-        if sine > 0.0 {
-            let normal = across / sine;
-            let cosine = from.dot(to);
-            first += normal * libm::atan2(sine, cosine);
-            let along = if cosine > 0.0 {
-                // The half angle's tangent keeps the digits of short edges.
-                let scaled = from_inverse * to_inverse;
-                (from_direction + to_direction) * (sine * scaled / (1.0 + cosine * scaled))
-            } else {
-                (to_direction - from_direction).cross(normal)
-            };
-            second[0] += along.x * normal.x;
-            second[1] += along.y * normal.y;
-            second[2] += along.z * normal.z;
-            second[3] += 0.5 * (along.x * normal.y + along.y * normal.x);
-            second[4] += 0.5 * (along.y * normal.z + along.z * normal.y);
-            second[5] += 0.5 * (along.z * normal.x + along.x * normal.z);
-        }
-
+        let to = Corner::new(point, polygon[next]);
+        add_edge(&mut sums, &from, &to);
         // The first and the last edge meet the apex and have no triangle.
         if step > 0 && step + 1 < polygon.len() {
-            let volume = to_apex.dot((from_corner - apex).cross(to_corner - apex));
-            let b = 0.25 * volume * inverse_apex * from_inverse * to_inverse;
-            let a = 0.25
-                * (1.0
-                    + apex_direction.dot(from_direction)
-                    + from_direction.dot(to_direction)
-                    + to_direction.dot(apex_direction));
+            let (a, b) = triangle_factor(&apex, &from, &to);
             (real, imaginary) = (real * a - imaginary * b, real * b + imaginary * a);
         }
-        (from_corner, from, from_inverse, from_direction) =
-            (to_corner, to, to_inverse, to_direction);
+        from = to;
     }
-
     let solid_angle = 2.0 * libm::atan2(imaginary, real);
-    for diagonal in &mut second[..3] {
+    for diagonal in &mut sums.second[..3] {
         *diagonal += solid_angle;
     }
     Moments {
         solid_angle,
-        first: first * 0.5,
-        second: second.map(|entry| entry / 3.0),
+        first: sums.first * 0.5,
+        second: sums.second.map(|entry| entry / 3.0),
     }
 }
 
-/// Moments with the sign of the winding, by Radon's rule of seven points a triangle, which is exact
-/// for polynomials of degree five.
+/// Adds what an edge brings to the sums: θ n to `first`, and the symmetric part of s nᵀ to `second`.
+fn add_edge(sums: &mut Moments, from: &Corner, to: &Corner) {
+    // The cross product of both offsets, from the shorter one and the edge itself: the difference of two
+    // long vectors would lose digits.
+    let shorter = if from.inverse > to.inverse { from } else { to };
+    let across = shorter.offset.cross(to.position - from.position);
+    let sine = across.length();
+    // An edge in line with the point subtends no angle.
+    if sine > 0.0 {
+        let normal = across / sine;
+        let cosine = from.offset.dot(to.offset);
+        sums.first += normal * libm::atan2(sine, cosine);
+        let along = if cosine > 0.0 {
+            // The tangent of half the angle keeps the digits of short edges.
+            let scaled = from.inverse * to.inverse;
+            (from.direction + to.direction) * (sine * scaled / (1.0 + cosine * scaled))
+        } else {
+            (to.direction - from.direction).cross(normal)
+        };
+        let second = &mut sums.second;
+        second[0] += along.x * normal.x;
+        second[1] += along.y * normal.y;
+        second[2] += along.z * normal.z;
+        second[3] += 0.5 * (along.x * normal.y + along.y * normal.x);
+        second[4] += 0.5 * (along.y * normal.z + along.z * normal.y);
+        second[5] += 0.5 * (along.z * normal.x + along.x * normal.z);
+    }
+}
+
+/// The complex number (real, imaginary) whose argument is half the solid angle of a triangle.
+fn triangle_factor(apex: &Corner, from: &Corner, to: &Corner) -> (f64, f64) {
+    let volume = apex
+        .offset
+        .dot((from.position - apex.position).cross(to.position - apex.position));
+    let imaginary = 0.25 * volume * apex.inverse * from.inverse * to.inverse;
+    let real = 0.25
+        * (1.0
+            + apex.direction.dot(from.direction)
+            + from.direction.dot(to.direction)
+            + to.direction.dot(apex.direction));
+    (real, imaginary)
+}
+
+/// Moments with the sign of the winding, by Radon's rule: seven points per triangle, exact for polynomials
+/// of degree five.
 fn quadrature(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
     let root = 15f64.sqrt();
     let rule = [
@@ -230,7 +268,7 @@ fn quadrature(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
     let corner = |k: usize| polygon[(nearest + k) % polygon.len()];
     for k in 1..polygon.len() - 1 {
         let (u, v) = (corner(k) - apex, corner(k + 1) - apex);
-        // Area times distance from the plane, and dω = distance from the plane / |x|³ dA.
+        // Area times distance from the plane: dω is that distance / |x|³ times dA.
         let scale = 0.5 * to_apex.dot(u.cross(v));
         let mut add = |i: f64, j: f64, weight: f64| {
             let x = to_apex + u * i + v * j;
@@ -258,7 +296,7 @@ fn quadrature(point: DVec3, polygon: &[DVec3], nearest: usize) -> Moments {
     moments
 }
 
-/// 1 / |v|, and 0 for a vector without length: a corner at the point itself then adds nothing.
+/// 1 / |v|, or 0 for a vector without length, so that a corner at the point itself adds nothing.
 fn inverse_length(v: DVec3) -> f64 {
     let length = v.length();
     if length > 0.0 { 1.0 / length } else { 0.0 }
@@ -271,7 +309,7 @@ mod tests {
     use crate::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
     use crate::lighting::sh;
 
-    /// Fixed numbers in [0, 1): a linear congruence, its upper bits.
+    /// Fixed pseudo-random numbers in [0, 1): the upper bits of a linear congruential generator.
     struct Numbers(u64);
 
     impl Numbers {
@@ -292,7 +330,7 @@ mod tests {
             }
         }
 
-        /// A convex polygon inscribed in an ellipse of at most `radius`.
+        /// A convex polygon of 3 to 8 corners on an ellipse whose larger radius is `radius`.
         fn polygon(&mut self, center: DVec3, normal: DVec3, radius: f64) -> Vec<DVec3> {
             let u = normal.any_orthonormal_vector() * radius;
             let v = normal.cross(u) * (0.3 + 0.7 * self.next());
@@ -307,7 +345,8 @@ mod tests {
         }
     }
 
-    /// Composite Gauss rule of five points in both coordinates of each triangle of a fan.
+    /// Moments by a composite Gauss rule: strips of five points in both coordinates of each triangle of a
+    /// fan.
     fn numeric(point: DVec3, polygon: &[DVec3]) -> Moments {
         const STRIPS: usize = 12;
         let (inner, outer) = ((10.0f64 / 7.0).sqrt(), 70f64.sqrt());
@@ -339,19 +378,7 @@ mod tests {
                 for &(t, wt) in &points {
                     let x = a + (u + v * t) * s;
                     let r = x.length();
-                    let w = x / r;
-                    let sample = Moments {
-                        solid_angle: 1.0,
-                        first: w,
-                        second: [
-                            w.x * w.x,
-                            w.y * w.y,
-                            w.z * w.z,
-                            w.x * w.y,
-                            w.y * w.z,
-                            w.z * w.x,
-                        ],
-                    };
+                    let sample = Moments::of_direction(x / r);
                     sum.add(&sample, scale * s * ws * wt / (r * r * r));
                 }
             }
@@ -361,12 +388,13 @@ mod tests {
         positive
     }
 
+    /// Frobenius norm of the second moment.
     fn second_length(m: &Moments) -> f64 {
         let square = |k: usize| m.second[k] * m.second[k] * if k < 3 { 1.0 } else { 2.0 };
         (0..6).map(square).sum::<f64>().sqrt()
     }
 
-    /// The largest error of the three moments, each relative to its length in `b`.
+    /// The largest difference of the three moments, each relative to its length in `b`.
     fn relative_error(a: &Moments, b: &Moments) -> f64 {
         let mut difference = *a;
         difference.add(b, -1.0);
@@ -393,15 +421,15 @@ mod tests {
                 let got = polygon_moments(point, &polygon);
                 worst = worst.max(relative_error(&got, &numeric(point, &polygon)));
             }
-            // Corners that nearly coincide make slivers, whose conditioning adds a factor of some
-            // hundred to the rounding of corners near 1.
+            // Corners that nearly coincide make slivers. Their conditioning multiplies the rounding of
+            // corners near 1 by some hundred.
             assert!(worst < 1e-11 + 3e-15 / radius, "{radius}: {worst}");
         }
     }
 
     #[test]
     fn the_faces_of_a_cube_make_the_whole_sphere() {
-        // The last point sees edges under nearly 180 degrees.
+        // From the last point, edges subtend nearly 180 degrees.
         for point in [[0.5, 0.5, 0.5], [0.1, 0.7, 0.9], [1e-6, 0.3, 1e-4]] {
             let mut sum = Moments::default();
             for face in Face::ALL {
@@ -410,7 +438,7 @@ mod tests {
             }
             let third = 4.0 * PI / 3.0;
             let expected = [third, third, third, 0.0, 0.0, 0.0];
-            // Next to an edge at the distance h rounding grows to 1e-16 / h, here 1e-12.
+            // At a distance h from an edge rounding grows to 1e-16 / h, here 1e-12.
             let tolerance = 2e-12;
             assert!((sum.solid_angle - 4.0 * PI).abs() < tolerance, "{sum:?}");
             assert!(sum.first.length() < tolerance, "{sum:?}");
@@ -428,7 +456,7 @@ mod tests {
             let point = numbers.direction() * (0.2 + numbers.next());
             let normal = numbers.direction();
             let whole = numbers.polygon(DVec3::ZERO, normal, 1.0);
-            // Rounding moves the plane by 1e-16, and the solid angle by that over the height.
+            // Rounding moves the plane by 1e-16, and changes the solid angle by that over the height.
             let height = point.dot(normal).abs();
             let cut = HalfSpace::through(numbers.direction() * 0.3, numbers.direction());
             let away = HalfSpace {
@@ -459,7 +487,7 @@ mod tests {
                 vec![a, b, b, (b + c) * 0.5, c, d, d],
                 vec![d, c, b, a],
             ] {
-                // Another order of the same sums.
+                // The same sums in another order.
                 let error = relative_error(&polygon_moments(point, &other), &plain);
                 assert!(error < 1e-12, "{error}");
             }
@@ -486,7 +514,7 @@ mod tests {
     }
 
     #[test]
-    fn a_far_polygon_is_a_point_of_its_solid_angle() {
+    fn a_far_polygon_is_a_point_light_of_its_solid_angle() {
         let center = DVec3::new(2.0, -1.0, 2.0);
         let omega = center / 3.0;
         let normal = DVec3::new(0.48, 0.6, 0.64);
@@ -510,7 +538,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_in_the_plane_or_at_a_corner_gives_numbers() {
+    fn a_point_in_the_plane_or_at_a_corner_gives_finite_moments() {
         let square = Face::PosZ.rectangle([0.0, 1.0], [0.0, 1.0]);
         let beside = polygon_moments(DVec3::new(1.5, 0.5, 1.0), &square);
         assert!(beside.solid_angle < 1e-15 && beside.first.length() < 1e-15);

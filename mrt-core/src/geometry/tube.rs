@@ -1,20 +1,20 @@
 //! Circular tubes in the unit cube: the cylinder shapes of Loos et al. 2011, section 6.1.
 //!
-//! [`TubeForm::Straight`] runs around the axis from the middle of face -x to the middle of +x.
-//! [`TubeForm::Bend`] is a quarter of a torus from the middle of +x to the middle of +z; its centre line is a
-//! quarter circle of radius 1/2 about the vertical edge x = 1, z = 1. Left and right bend are this one
+//! [`TubeForm::Straight`] runs from the middle of face -x to the middle of +x. [`TubeForm::Bend`] is a
+//! quarter of a torus, from the middle of +x to the middle of +z. Its centre line is a quarter circle of
+//! radius 1/2 about the vertical edge x = 1, z = 1. The bends to the left and to the right are this one
 //! shape, entered at +x and at +z.
 //!
-//! The wall is cut into four charts of [0, 1]², each a quarter of the circular section, named by the face of
-//! the cube that they lie on when the tube is blown up to a square one: -y, +y, -z, +z on the
-//! straight tube; -y, +y, -x (outer side) and -z (inner side) on the bend. In each, u runs along the
-//! tube and v around it, in the direction in which the flat face's u and v grow
-//! ([`crate::geometry::cube`]), so texel layouts of cubes carry over.
+//! The wall is cut into four charts of [0, 1]², each a quarter of the circular section. A chart has the
+//! name of the face that it would lie on if the tube were blown up to a square one: -y, +y, -z, +z on the
+//! straight tube; -y, +y, -x (outer side) and -z (inner side) on the bend. In each chart u runs along the
+//! tube and v around it, in the directions in which u and v of the flat face grow
+//! ([`cube`](crate::geometry::cube)), so texel layouts of cubes carry over.
 //!
-//! The torus about the edge (1, y, 1), with M the radius of the centre line and ρ the distance from the
-//! edge, is where (ρ - M)² + (y - 1/2)² <= R². Squared free of roots, the inside is f >= 0 with
-//! f = 4 M² ρ² - (ρ² + (y - 1/2)² + M² - R²)², a polynomial of degree four along a line. Rays and
-//! segments are decided on its Bernstein coefficients (`tube/quartic.rs`).
+//! Let M be the radius of the bend's centre line, and ρ the distance from the edge (1, y, 1). The torus is
+//! where (ρ - M)² + (y - 1/2)² <= R². Squaring removes the root in ρ: the inside is where f >= 0 with
+//! f = 4 M² ρ² - (ρ² + (y - 1/2)² + M² - R²)², which along a line is a polynomial of degree four. Its
+//! Bernstein coefficients decide where rays and segments end (`tube/quartic.rs`).
 
 mod quartic;
 
@@ -25,15 +25,15 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Radius R of every tube, in block widths.
 ///
-/// The tube fills half of the cube's section, and the inner side of a bend keeps a radius of 0.1 about its
-/// edge: a texel there is a ninth as long as one on the outer side. At 0.5 it would have no length.
+/// At 0.4 the tube fills half of the cube's section. The inner side of a bend has a radius of 0.1 about the
+/// edge, where a texel is a ninth as long as on the outer side. At 0.5 it would have no length.
 pub const TUBE_RADIUS: f64 = 0.4;
 
-/// Radius M of a bend's centre line: from the edge to the middle of a face.
+/// Radius M of a bend's centre line, which is the distance from the edge to the middle of a face.
 const BEND_RADIUS: f64 = 0.5;
 
-/// How far outside the wall, in block widths, a point may lie and still count as on it: positions that
-/// went through `f32`, with a margin.
+/// How far outside the wall, in block widths, a point may lie and still count as on it: the rounding of
+/// positions to `f32`, with a margin.
 const WALL_TOLERANCE: f64 = 1e-6;
 
 /// Longer than any segment within the unit cube.
@@ -42,7 +42,7 @@ const BEYOND_CUBE: f64 = 2.0;
 /// The canonical tubes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TubeForm {
-    /// From -x to +x. Convex: any two of its points see one another.
+    /// From -x to +x. It is convex: any two of its points see one another.
     Straight,
     /// From +x to +z.
     Bend,
@@ -51,24 +51,24 @@ pub enum TubeForm {
 /// A point of a tube's wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
-    /// In the unit cube.
+    /// Position in the unit cube.
     pub position: DVec3,
     /// Unit normal into the tube.
     pub normal: DVec3,
     /// Unit tangents in the directions of growing u (along the tube) and v (around it).
     pub tangents: [DVec3; 2],
-    /// Area of wall for an area of the chart, d²A / du dv.
+    /// Area of the wall for an area of the chart, d²A / du dv.
     pub area_per_uv: f64,
 }
 
-/// Where a ray ends that starts in a tube.
+/// Where a ray from inside a tube ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TubeHit {
     /// Distance from the origin, in lengths of the ray's direction.
     pub distance: f64,
-    /// The point there, on the wall or in an opening.
+    /// The point of the wall or of an opening where the ray ends.
     pub point: DVec3,
-    /// The opening through which the ray leaves; `None` on the wall.
+    /// The opening through which the ray leaves; `None` if it ends on the wall.
     pub opening: Option<Face>,
 }
 
@@ -76,7 +76,7 @@ impl TubeForm {
     /// Both forms.
     pub const ALL: [TubeForm; 2] = [TubeForm::Straight, TubeForm::Bend];
 
-    /// The two faces in whose middle the tube ends, in the order of [`Face::ALL`].
+    /// The two faces at which the tube ends, in the order of [`Face::ALL`].
     pub fn openings(self) -> [Face; 2] {
         match self {
             TubeForm::Straight => [Face::NegX, Face::PosX],
@@ -92,8 +92,8 @@ impl TubeForm {
         }
     }
 
-    /// The point at `along` in [0, 1], from -x to +x or from +z to +x, and (across, up) from the centre line;
-    /// across is +z in the straight tube, away from the edge x = 1, z = 1 in the bend.
+    /// The point at `along` in [0, 1], from -x to +x or from +z to +x, and at `section` (across, up) from the
+    /// centre line. Across is +z in the straight tube, and away from the edge x = 1, z = 1 in the bend.
     pub fn point(self, along: f64, section: DVec2) -> DVec3 {
         match self {
             TubeForm::Straight => DVec3::new(along, 0.5 + section.y, 0.5 + section.x),
@@ -135,13 +135,13 @@ impl TubeForm {
         }
     }
 
-    /// The centre, in (u, v), of texel (row j, column i) of a chart's `resolution`² grid.
+    /// The middle, in u and v, of texel (row j, column i) of a chart's `resolution`² grid.
     pub fn texel_center(self, chart: Face, resolution: usize, j: usize, i: usize) -> SurfacePoint {
         let step = 1.0 / resolution as f64;
         self.surface(chart, (i as f64 + 0.5) * step, (j as f64 + 0.5) * step)
     }
 
-    /// Exact area of a texel in row j of a chart's `resolution`² grid; all columns have the same.
+    /// Exact area of a texel in row j of a chart's `resolution`² grid. It is the same in all columns.
     pub fn texel_area(self, chart: Face, resolution: usize, j: usize) -> f64 {
         let step = 1.0 / resolution as f64;
         let (from, to) = (arc_angle(j as f64 * step), arc_angle((j + 1) as f64 * step));
@@ -149,8 +149,8 @@ impl TubeForm {
         match self {
             TubeForm::Straight => step * TUBE_RADIUS * width,
             TubeForm::Bend => {
-                // The turned section is the derivative of the section by the angle, and its own
-                // derivative is the section reversed.
+                // The turned section is the derivative of the section by the angle, and its own derivative
+                // is minus the section. So minus the turned section is an integral of the section.
                 let integral = |angle| -self.section(chart, angle)[1][0];
                 let across = integral(to) - integral(from);
                 width * TUBE_RADIUS * (BEND_RADIUS * width + TUBE_RADIUS * across)
@@ -158,7 +158,7 @@ impl TubeForm {
         }
     }
 
-    /// Area of the whole wall: 2πR by the length of the centre line, which is also the torus's (Pappus).
+    /// Area of the whole wall: 2πR times the length of the centre line, also for the torus (Pappus).
     pub fn wall_area(self) -> f64 {
         let length = match self {
             TubeForm::Straight => 1.0,
@@ -167,8 +167,8 @@ impl TubeForm {
         4.0 * FRAC_PI_2 * TUBE_RADIUS * length
     }
 
-    /// The chart and (u, v) of a point on the wall, or of the wall's point nearest to one inside: the
-    /// inverse of [`TubeForm::surface`].
+    /// The chart and (u, v) of a point on the wall, or of the point of the wall nearest to a point inside:
+    /// the inverse of [`TubeForm::surface`].
     pub fn chart_of(self, point: DVec3) -> (Face, f64, f64) {
         let [across, up] = self.section_of(point);
         let along = match self {
@@ -200,18 +200,18 @@ impl TubeForm {
         )
     }
 
-    /// Distance to the wall, continued beyond the openings as a whole torus or an endless cylinder: positive
-    /// inside.
+    /// Distance to the wall, positive inside. Beyond the openings the wall continues as an endless cylinder
+    /// or a whole torus.
     pub fn wall_distance(self, point: DVec3) -> f64 {
         let [across, up] = self.section_of(point);
         TUBE_RADIUS - (across * across + up * up).sqrt()
     }
 
-    /// The point itself, or the nearest one of the wall if it is outside.
+    /// The point itself, or the nearest point of the wall if it is outside.
     pub fn drawn_inside(self, point: DVec3) -> DVec3 {
         let [across, up] = self.section_of(point);
         let scale = TUBE_RADIUS / (across * across + up * up).sqrt();
-        // Also false for the centre line, where the scale is infinite.
+        // On the centre line the scale is infinite, which is not outside.
         let is_outside = scale < 1.0;
         if !is_outside {
             return point;
@@ -220,7 +220,7 @@ impl TubeForm {
         match self {
             TubeForm::Straight => DVec3::new(point.x, height, 0.5 + across * scale),
             TubeForm::Bend => {
-                // No point of the axis has a nearest one.
+                // On the torus's axis no point of the wall is nearest, and the distance is zero.
                 let distance = (BEND_RADIUS + across).max(f64::MIN_POSITIVE);
                 let stretch = (BEND_RADIUS + across * scale) / distance;
                 DVec3::new(
@@ -232,7 +232,7 @@ impl TubeForm {
         }
     }
 
-    /// True in the tube or on its wall, between the openings, within a tolerance of 1e-6.
+    /// True for points in the tube or on its wall, between the openings, within a tolerance of 1e-6.
     pub fn contains(self, point: DVec3) -> bool {
         let past = match self {
             TubeForm::Straight => (-point.x).max(point.x - 1.0),
@@ -243,9 +243,11 @@ impl TubeForm {
 
     /// True if two points of the tube, inside or on its wall, see one another.
     ///
-    /// Where the segment dips into the wall for less than 2^-16 of its length it counts as free. Cost: nothing
-    /// on a straight tube; else 40 multiplications and, near the edge of a shadow, some bisections, 30 ns in all. A
-    /// point that is more than about 1e-6 outside a bend's wall sees nothing.
+    /// A segment that dips into the wall for less than 2^-16 of its length counts as free. A point that is
+    /// more than about 1e-6 outside a bend's wall sees nothing.
+    ///
+    /// Cost: nothing in a straight tube. In a bend 40 multiplications and, near the edge of a shadow, some
+    /// bisections, 30 ns in all.
     pub fn segment_is_free(self, from: DVec3, to: DVec3) -> bool {
         match self {
             TubeForm::Straight => true,
@@ -257,11 +259,11 @@ impl TubeForm {
 
     /// Where a ray from a point in the tube or on its wall meets the wall, or leaves through an opening.
     ///
-    /// The wall on which the ray starts counts only if the ray heads into it, at distance 0. `direction` must
-    /// not be zero. Cost: 250 ns in a bend.
+    /// A ray that starts on the wall and heads into it ends at distance 0; otherwise the wall at its start
+    /// does not count. `direction` must not be zero. Cost: 250 ns in a bend.
     pub fn first_hit(self, origin: DVec3, direction: DVec3) -> TubeHit {
-        // The openings are faces of a convex region that cuts just this tube out of the endless one. A ray
-        // that is further from their planes than the cube is wide meets the wall before.
+        // The planes of the openings cut this tube out of the endless one. A ray that has farther to go to
+        // them than any segment within the cube meets the wall before.
         let mut limit = (BEYOND_CUBE / direction.length(), None);
         for face in self.openings() {
             let axis = face.axis();
@@ -291,8 +293,8 @@ impl TubeForm {
         }
     }
 
-    /// Unit vector from the centre line at an angle of a chart, and that vector's derivative by the
-    /// angle, as (across, up): across is +z in the straight tube, away from the edge in the bend.
+    /// Unit vector from the centre line at an angle of a chart, and its derivative by the angle, both as
+    /// (across, up). Across is +z in the straight tube, and away from the edge in the bend.
     fn section(self, chart: Face, angle: f64) -> [[f64; 2]; 2] {
         let (sine, cosine) = libm::sincos(angle);
         match (self, chart) {
@@ -307,7 +309,7 @@ impl TubeForm {
         }
     }
 
-    /// (across, up) of a point, from the centre line.
+    /// Offset of a point from the centre line, as (across, up).
     fn section_of(self, point: DVec3) -> [f64; 2] {
         let up = point.y - 0.5;
         match self {
@@ -319,9 +321,10 @@ impl TubeForm {
         }
     }
 
-    /// u of a chart from the position along the tube, 0 at -x or +z and 1 at +x, and back.
+    /// The u of a chart from the position along the tube, which is 0 at -x or +z and 1 at +x; or that
+    /// position from u.
     fn along(self, chart: Face, u: f64) -> f64 {
-        // u of the outer side grows with z, away from the opening at +x.
+        // On the outer side u grows with z, away from the opening at +x.
         if self == TubeForm::Bend && chart == Face::NegX {
             1.0 - u
         } else {
@@ -330,12 +333,12 @@ impl TubeForm {
     }
 }
 
-/// Angle of v from the middle of its chart.
+/// Angle between `v` and the middle of its chart.
 fn arc_angle(v: f64) -> f64 {
     FRAC_PI_2 * (v - 0.5)
 }
 
-/// Distance at which a ray from inside leaves the endless straight tube; `None` along its axis.
+/// Distance at which a ray from inside leaves the endless straight tube; `None` if it runs along the axis.
 fn cylinder_exit(origin: DVec3, direction: DVec3) -> Option<f64> {
     let (y, z) = (origin.y - 0.5, origin.z - 0.5);
     let a = direction.y * direction.y + direction.z * direction.z;
@@ -343,10 +346,10 @@ fn cylinder_exit(origin: DVec3, direction: DVec3) -> Option<f64> {
         return None;
     }
     let b = y * direction.y + z * direction.z;
-    // Not above 0 inside; on the wall rounding must not turn it into a wall to pass.
+    // Inside this is at most 0. On the wall, rounding must not make it positive.
     let c = (y * y + z * z - TUBE_RADIUS * TUBE_RADIUS).min(0.0);
     let root = (b * b - a * c).sqrt();
-    // The larger root, written so that nothing cancels.
+    // The larger root, written so that no digits cancel.
     Some(if b > 0.0 {
         -c / (b + root)
     } else {
@@ -354,7 +357,7 @@ fn cylinder_exit(origin: DVec3, direction: DVec3) -> Option<f64> {
     })
 }
 
-/// The polynomial f of the module's head along `origin + t offset`, t in [0, 1].
+/// The polynomial f of the module documentation along `origin + t * offset`, for t in [0, 1].
 fn bend_along(origin: DVec3, offset: DVec3) -> Quartic {
     let start = origin - DVec3::new(1.0, 0.5, 1.0);
     let flat = |a: DVec3, b: DVec3| a.x * b.x + a.z * b.z;

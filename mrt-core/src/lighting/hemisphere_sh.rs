@@ -1,22 +1,23 @@
-//! Irradiance as a function of the normal in four coefficients, for surfaces whose normal varies
-//! within a texel: linear spherical harmonics, optimal for the normals around that of the surface.
+//! Irradiance as a function of the normal in four coefficients, for surfaces whose normal varies within a
+//! texel: linear spherical harmonics, optimal for the normals around that of the surface.
 //!
-//! Source: B. Loos et al., "Modular Radiance Transfer", 2011, section 6.4 and appendix B: irradiance is
-//! nearly quadratic in the normal, and its nine coefficients go to the four whose function is nearest to
-//! theirs over the hemisphere ([`ohlsh_from_sh9`]). Truncating them to four is optimal over the sphere,
-//! half of which no normal ever points to.
+//! Source: B. Loos et al., "Modular Radiance Transfer", 2011, section 6.4 and appendix B (OHLSH).
+//! Irradiance is nearly quadratic in the normal. [`ohlsh_from_sh9`] replaces its nine coefficients by four
+//! whose function is nearest to theirs over the hemisphere. Truncating the nine to four would be optimal
+//! over the whole sphere, half of which no normal points to.
 //!
-//! [`ohlsh_from_moments`] departs from that in three ways: it fits the normals within 60 degrees, it fits
-//! irradiance itself instead of its first three bands, knowing that no light comes from below the
-//! surface, and it is exact for the surface's own normal.
+//! [`ohlsh_from_moments`] departs from that in three ways. It fits the normals within 60 degrees. It fits
+//! irradiance itself instead of its first three bands, knowing that no light comes from below the surface.
+//! And it is exact for the surface's own normal.
 //!
-//! All directions are in the frame of the surface, whose normal is +z. The coefficients belong to the
-//! first four functions of [`sh`]: 1, y, z, x. They have the unit of irradiance.
+//! All directions are in the frame of the surface, whose normal is +z. The coefficients belong to the first
+//! four functions of [`sh`]: 1, y, z, x. They have the unit of irradiance.
 //!
-//! Errors in percent inside a cube, as measured by the test at the foot: relative L2 over the normals
-//! within 60 degrees, mean and worst over 36 points of a wall and five lightings of a kind. The other
-//! walls emit: one alone, all with brightness from 1 to 100 and gradients, or one with a
-//! quarter of its brightness on the others. The last column has a fourth kind too, 1 to 100 without gradients.
+//! The table gives errors on a wall of a cube whose other walls emit, in percent, as measured by the test
+//! below. They are relative L2 errors over the normals within 60 degrees: mean and worst over 36 points of
+//! the wall and five lightings of a kind. Kinds of lighting: one wall alone; all walls, with brightness
+//! from 1 to 100 and gradients; one wall, with a quarter of its brightness on the others. The last column
+//! is over these and a fourth kind: 1 to 100 without gradients.
 //!
 //! | coefficients | one wall | 1 to 100 | one and 1/4 | all |
 //! | --- | --- | --- | --- | --- |
@@ -26,8 +27,8 @@
 //! | nearest linear function | 7.2, 14.0 | 4.2, 10.6 | 2.7, 3.8 | 4.5, 14.0 |
 //! | nine of irradiance | 2.1, 3.8 | 1.1, 2.8 | 0.8, 1.0 | 1.2, 3.8 |
 //!
-//! So no four linear coefficients stay within 3 % where one wall outshines the others. About half of
-//! what is left is curvature in xy and x² - y².
+//! So no four linear coefficients stay within 3 % where one wall outshines the others. About half of the
+//! remaining error is curvature in xy and x² - y².
 
 use crate::geometry::polygon_moments::Moments;
 use crate::lighting::sh;
@@ -40,12 +41,12 @@ const SLOPE_ALONG_NORMAL: [f64; 3] = [-0.724_885_4, 2.334_805_2, -0.577_551_8];
 /// Slope along x divided by x, as a polynomial 1, z of the direction that the light comes from.
 const SLOPE_ACROSS: [f64; 2] = [0.512_249_7, 0.609_844_3];
 
-/// The four coefficients from the nine of irradiance as a function of the normal (order 3 of [`sh`]),
-/// by least squares over the hemisphere of normals z > 0.
+/// The four coefficients from the nine of irradiance as a function of the normal (order 3 of [`sh`]), by
+/// least squares over the hemisphere of normals z > 0. Appendix B of the paper.
 pub fn ohlsh_from_sh9(irradiance: &[f64; 9]) -> [f64; 4] {
     let b = irradiance;
-    // Over the hemisphere 3z² - 1 is nearest to 3z - 3/2, and yz and xz to 3/8 of y and x; xy and
-    // x² - y² are orthogonal to all four.
+    // Over the hemisphere the nearest linear function to 3z² - 1 is 3z - 3/2, and those to yz and xz are
+    // 3/8 of y and x; xy and x² - y² are orthogonal to all linear functions.
     let (root_5, root_15) = (5f64.sqrt(), 15f64.sqrt());
     [
         b[0] - 0.75 * root_5 * b[6],
@@ -56,12 +57,12 @@ pub fn ohlsh_from_sh9(irradiance: &[f64; 9]) -> [f64; 4] {
 }
 
 /// The four coefficients from the moments of the incident radiance in the frame of the surface, by least
-/// squares over the normals within 60 degrees; exact for the normal +z. Not from the paper.
+/// squares over the normals within 60 degrees. Exact for the normal +z. Not from the paper.
 ///
-/// All light must come from z >= 0. With M the moments, E(n) is
-/// `Mz + S (nz - 1) + Tx nx + Ty ny`. S and T are the slopes that fit the clamped cosine of a single
-/// light best; as functions of the light's direction they are themselves fitted, over the hemisphere, by
-/// what the moments can give: S by 1, z, z², and T by x, xz and y, yz.
+/// All light must come from z >= 0. With M the first moment, E(n) is
+/// `Mz + S (nz - 1) + Tx nx + Ty ny`. The slopes S and T are those that fit the clamped cosine of a single
+/// light best. As functions of the light's direction they are themselves fitted over the hemisphere, by
+/// functions that the moments can integrate: S by 1, z, z²; Tx by x, xz; Ty by y, yz.
 pub fn ohlsh_from_moments(local: &Moments) -> [f64; 4] {
     let [_, _, zz, _, yz, zx] = local.second;
     let DVec3 { x, y, z } = local.first;
@@ -78,8 +79,9 @@ pub fn ohlsh_from_moments(local: &Moments) -> [f64; 4] {
     ]
 }
 
-/// The nine coefficients of irradiance as a function of the normal (order 3 of [`sh`]) in the frame of
-/// the orthonormal `axes` x, y, z, from the moments of the incident radiance in that of the axes.
+/// The nine coefficients of irradiance as a function of the normal (order 3 of [`sh`]), from the moments of
+/// the incident radiance. `axes` are the orthonormal x, y and z of the surface's frame, in the frame of the
+/// moments.
 ///
 /// Radiance 1 from everywhere gives the irradiance π.
 pub fn local_irradiance_sh(radiance: &Moments, axes: &[DVec3; 3]) -> [f64; 9] {
@@ -88,12 +90,12 @@ pub fn local_irradiance_sh(radiance: &Moments, axes: &[DVec3; 3]) -> [f64; 9] {
     coefficients
 }
 
-/// Irradiance on a unit `normal` in the frame of the surface. May be slightly negative.
+/// Irradiance on a unit `normal` in the frame of the surface. It may be slightly negative.
 pub fn evaluate(coefficients: &[f64; 4], normal: DVec3) -> f64 {
     sh::value(coefficients, normal)
 }
 
-/// [`evaluate`] for the frame: computed in `f64`, rounded once.
+/// [`evaluate`] for `f32`: computed in `f64` and rounded once.
 pub fn evaluate_f32(coefficients: &[f32; 4], normal: Vec3) -> f32 {
     sh::value(coefficients, normal.as_dvec3()) as f32
 }
@@ -107,7 +109,7 @@ mod tests {
 
     const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
 
-    /// Midpoints of equal solid angles with z from `lowest` to 1.
+    /// Midpoints of cells of equal solid angle, with z from `lowest` to 1.
     fn directions(lowest: f64, rings: usize, azimuths: usize) -> Vec<DVec3> {
         let mut points = Vec::new();
         for ring in 0..rings {
@@ -121,7 +123,7 @@ mod tests {
         points
     }
 
-    /// The linear function nearest to the values at `normals` that are symmetric about z.
+    /// The linear function nearest to the values at `normals`, which are symmetric about z.
     fn nearest_linear(normals: &[DVec3], values: &[f64]) -> [f64; 4] {
         let sum = |f: &dyn Fn(DVec3, f64) -> f64| -> f64 {
             normals.iter().zip(values).map(|(&n, &v)| f(n, v)).sum()
@@ -138,22 +140,6 @@ mod tests {
             linear * z,
             linear * x,
         ]
-    }
-
-    /// The moments of light from one direction.
-    fn light(d: DVec3) -> Moments {
-        Moments {
-            solid_angle: 1.0,
-            first: d,
-            second: [
-                d.x * d.x,
-                d.y * d.y,
-                d.z * d.z,
-                d.x * d.y,
-                d.y * d.z,
-                d.z * d.x,
-            ],
-        }
     }
 
     #[test]
@@ -184,7 +170,7 @@ mod tests {
                 let product: f64 = pairs().map(|(&n, c)| f(n) * (c - offset)).sum();
                 product / pairs().map(|(&n, _)| f(n) * f(n)).sum::<f64>()
             };
-            let a = ohlsh_from_moments(&light(*d));
+            let a = ohlsh_from_moments(&Moments::of_direction(*d));
             let linear = (0.75 / PI).sqrt();
             let across = d.truncate().length();
             let toward = |n: DVec3| (n.x * d.x + n.y * d.y) / across;
@@ -204,7 +190,7 @@ mod tests {
     #[test]
     fn the_fit_of_the_cone_is_exact_at_the_surface_normal() {
         for d in directions(0.0, 7, 5) {
-            let a = ohlsh_from_moments(&light(d));
+            let a = ohlsh_from_moments(&Moments::of_direction(d));
             assert!((evaluate(&a, DVec3::Z) - d.z).abs() < 1e-14);
         }
         let narrow = [0.7f32, -0.2, 0.4, 0.1];
@@ -239,22 +225,24 @@ mod tests {
         }
     }
 
-    /// Mean and worst of relative errors, in percent.
+    /// Relative errors of one method.
     #[derive(Default)]
     struct Errors(Vec<f64>);
 
     impl Errors {
-        fn mean(&self) -> f64 {
-            100.0 * self.0.iter().sum::<f64>() / self.0.len() as f64
-        }
-
-        fn worst(&self) -> f64 {
-            100.0 * self.0.iter().copied().fold(0.0, f64::max)
+        /// Mean and worst, in percent.
+        fn mean_and_worst(&self) -> [f64; 2] {
+            let mean = self.0.iter().sum::<f64>() / self.0.len() as f64;
+            let worst = self.0.iter().copied().fold(0.0, f64::max);
+            [mean, worst].map(|error| 100.0 * error)
         }
     }
 
-    /// Radiosity at (u, v) in [-1, 1]² of a wall, for lighting k of 20: one bright wall, walls of very
-    /// different brightness, the same with gradients, and one wall with a quarter of it on the others.
+    const LIGHTINGS: usize = 20;
+
+    /// Radiosity at (u, v) in [-1, 1]² of a wall, for a lighting of [`LIGHTINGS`]. Five each are of one
+    /// kind: one bright wall; walls of very different brightness; the same with gradients; one bright wall
+    /// with a quarter of its brightness on the others.
     fn radiosity(lighting: usize, wall: usize, u: f64, v: f64) -> f64 {
         let (kind, k) = (lighting / 5, lighting % 5);
         let bright = if wall == k { 1.0 } else { 0.0 };
@@ -267,19 +255,22 @@ mod tests {
         }
     }
 
-    #[test]
-    fn errors_in_a_cube_are_those_of_the_table() {
-        const PATCHES: usize = 6;
-        const LIGHTINGS: usize = 20;
-        let normals = directions(0.5, 6, 16);
-        let walls = Face::ALL.into_iter().filter(|&face| face != Face::NegZ);
-        let mut errors: [[Errors; 5]; 5] = Default::default();
-        let mut scratch = Vec::new();
-        for texel in 0..36 {
-            let point = Face::NegZ.texel_center(6, texel / 6, texel % 6);
-            let mut exact = vec![vec![0.0; normals.len()]; LIGHTINGS];
+    /// What arrives at a point of the wall -z, for every lighting.
+    struct Arriving {
+        /// Exact irradiance for each normal.
+        irradiance: Vec<Vec<f64>>,
+        moments: [Moments; LIGHTINGS],
+    }
+
+    impl Arriving {
+        /// From 6² patches of uniform radiosity on each of the other walls.
+        fn at(point: DVec3, normals: &[DVec3]) -> Self {
+            const PATCHES: usize = 6;
+            let mut irradiance = vec![vec![0.0; normals.len()]; LIGHTINGS];
             let mut moments = [Moments::default(); LIGHTINGS];
-            for (wall, face) in walls.clone().enumerate() {
+            let mut scratch = Vec::new();
+            let walls = Face::ALL.into_iter().filter(|&face| face != Face::NegZ);
+            for (wall, face) in walls.enumerate() {
                 for patch in 0..PATCHES * PATCHES {
                     let at = [patch % PATCHES, patch / PATCHES];
                     let [u, v] = at.map(|i| [i, i + 1].map(|i| i as f64 / PATCHES as f64));
@@ -294,52 +285,75 @@ mod tests {
                         let horizon = HalfSpace::through(point, normal);
                         clip_polygon(&mut above, &horizon, &mut scratch);
                         let factor = point_to_polygon(point, normal, &above);
-                        for (lighting, values) in exact.iter_mut().enumerate() {
+                        for (lighting, values) in irradiance.iter_mut().enumerate() {
                             values[k] += radiosity(lighting, wall, u, v) * factor;
                         }
                     }
                 }
             }
-            for (lighting, values) in exact.iter().enumerate() {
-                let quadratic = local_irradiance_sh(&moments[lighting], &AXES);
-                let [b0, b1, b2, b3, ..] = quadratic;
-                let linear = [
-                    [b0, b1, b2, b3],
-                    ohlsh_from_sh9(&quadratic),
-                    ohlsh_from_moments(&moments[lighting]),
-                    nearest_linear(&normals, values),
-                ];
-                let error = |approximate: &dyn Fn(DVec3) -> f64| {
-                    let square: f64 = normals
-                        .iter()
-                        .zip(values)
-                        .map(|(&n, v)| (approximate(n) - v).powi(2))
-                        .sum();
-                    (square / values.iter().map(|v| v * v).sum::<f64>()).sqrt()
-                };
-                let mut of_methods = [0.0; 5];
-                for (of_method, a) in of_methods.iter_mut().zip(&linear) {
-                    *of_method = error(&|n| evaluate(a, n));
-                }
-                of_methods[4] = error(&|n| sh::value(&quadratic, n));
-                for (method, of_method) in of_methods.into_iter().enumerate() {
-                    errors[method][lighting / 5].0.push(of_method);
-                    errors[method][4].0.push(of_method);
+            Self {
+                irradiance,
+                moments,
+            }
+        }
+
+        /// Relative errors for one lighting, in the order of the table's rows.
+        fn errors(&self, normals: &[DVec3], lighting: usize) -> [f64; 5] {
+            let values = &self.irradiance[lighting];
+            let moments = &self.moments[lighting];
+            let error = |approximate: &dyn Fn(DVec3) -> f64| {
+                let square: f64 = normals
+                    .iter()
+                    .zip(values)
+                    .map(|(&n, v)| (approximate(n) - v).powi(2))
+                    .sum();
+                (square / values.iter().map(|v| v * v).sum::<f64>()).sqrt()
+            };
+            let quadratic = local_irradiance_sh(moments, &AXES);
+            let [b0, b1, b2, b3, ..] = quadratic;
+            let [truncated, appendix_b, cone, nearest] = [
+                [b0, b1, b2, b3],
+                ohlsh_from_sh9(&quadratic),
+                ohlsh_from_moments(moments),
+                nearest_linear(normals, values),
+            ]
+            .map(|linear| error(&|n| evaluate(&linear, n)));
+            [
+                truncated,
+                appendix_b,
+                cone,
+                nearest,
+                error(&|n| sh::value(&quadratic, n)),
+            ]
+        }
+    }
+
+    #[test]
+    fn errors_in_a_cube_are_those_of_the_table() {
+        let normals = directions(0.5, 6, 16);
+        let mut errors: [Errors; 5] = Default::default();
+        for texel in 0..36 {
+            let point = Face::NegZ.texel_center(6, texel / 6, texel % 6);
+            let arriving = Arriving::at(point, &normals);
+            for lighting in 0..LIGHTINGS {
+                let found = arriving.errors(&normals, lighting);
+                for (of_method, error) in errors.iter_mut().zip(found) {
+                    of_method.0.push(error);
                 }
             }
         }
-        let [truncated, appendix_b, cone, nearest, quadratic] =
-            errors.map(|[.., all]| [all.mean(), all.worst()]);
-        // The figures above, with room for their last digit.
+        // The last column of the table.
         let table = [
-            (truncated, [13.0, 25.2]),
-            (appendix_b, [6.9, 16.7]),
-            (cone, [4.6, 14.0]),
-            (nearest, [4.5, 14.0]),
-            (quadratic, [1.2, 3.8]),
+            [13.0, 25.2],
+            [6.9, 16.7],
+            [4.6, 14.0],
+            [4.5, 14.0],
+            [1.2, 3.8],
         ];
-        for (measured, expected) in table {
+        for (method, expected) in errors.iter().zip(table) {
+            let measured = method.mean_and_worst();
             for (a, b) in measured.into_iter().zip(expected) {
+                // Room for the rounding of the last digit.
                 assert!((a - b).abs() < 0.06, "{measured:?} and {expected:?}");
             }
         }

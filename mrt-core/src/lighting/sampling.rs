@@ -1,13 +1,13 @@
-//! Low-discrepancy points in the unit square, and the maps that carry them to the disk, the
-//! hemisphere and the sphere.
+//! Low-discrepancy points in the unit square, and maps from the square to the disk, the hemisphere and the
+//! sphere.
 //!
-//! Every result has the same bits on every machine: integers, exactly rounded operations, and `libm`
-//! for the rest.
+//! Every result has the same bits on every machine: it is made of integers, exactly rounded operations, and
+//! `libm` for the rest.
 //!
-//! The maps start from the square [-1, 1]² because the concentric map is odd in both coordinates: a
-//! quarter turn of the square is then a quarter turn of the image bit for bit, so that grids of
-//! directions made with [`cell_center`] have the symmetry of the square exactly. Points of [0, 1)²
-//! come there by [`square_from_unit`]. Hemispheres are around +z.
+//! The maps start from the square [-1, 1]², where the concentric map is odd in both coordinates. So a
+//! quarter turn of the square is a quarter turn of the image, bit for bit, and grids of directions made with
+//! [`cell_center`] have exactly the symmetry of the square. [`square_from_unit`] takes points of [0, 1)² to
+//! this square. Hemispheres are around +z.
 //!
 //! Sources: P. Shirley and K. Chiu, "A Low Distortion Map Between Disk and Square", Journal of
 //! Graphics Tools 2(3), 1997; B. Burley, "Practical Hash-based Owen Scrambling", Journal of Computer
@@ -16,12 +16,11 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4, PI, SQRT_2};
 
-/// Point `index` of a Sobol' sequence in [0, 1)², with Owen's scrambling and a shuffled order chosen
-/// by `seed`.
+/// Point `index` of a Sobol' sequence in [0, 1)². `seed` chooses its Owen scrambling and shuffled order.
 ///
-/// Any 2^k points that start at a multiple of 2^k are a (0, k, 2)-net: each of the elementary boxes of
-/// area 2^-k holds one. Sequences of different seeds are uncorrelated, and so may be paired up
-/// for more than two dimensions.
+/// Any 2^k points that start at a multiple of 2^k are a (0, k, 2)-net: each elementary box of area 2^-k
+/// contains exactly one. Sequences of different seeds are uncorrelated, so pairs of them make points of more
+/// than two dimensions.
 pub fn sobol_point(index: u32, seed: u32) -> DVec2 {
     let index = nested_uniform_scramble(index, hash(seed, 0));
     let x = nested_uniform_scramble(index.reverse_bits(), hash(seed, 1));
@@ -29,8 +28,8 @@ pub fn sobol_point(index: u32, seed: u32) -> DVec2 {
     DVec2::new(unit_from_bits(x), unit_from_bits(y))
 }
 
-/// Point `index` of the `count` points of Hammersley's set in [0, 1)²: evenly spaced in x, bits
-/// reversed in y.
+/// Point `index` of the `count` points of Hammersley's set in [0, 1)²: x is evenly spaced, y is the index with
+/// its bits reversed.
 pub fn hammersley_point(index: u32, count: u32) -> DVec2 {
     DVec2::new(
         f64::from(index) / f64::from(count),
@@ -38,7 +37,7 @@ pub fn hammersley_point(index: u32, count: u32) -> DVec2 {
     )
 }
 
-/// Mixes two integers into one; for seeds of [`sobol_point`] made from, say, a texel's index.
+/// Mixes two integers into one, such as a seed and a texel's index into a seed of [`sobol_point`].
 pub fn hash(a: u32, b: u32) -> u32 {
     // The finaliser of MurmurHash3 after each word.
     let mix = |mut x: u32| {
@@ -51,20 +50,20 @@ pub fn hash(a: u32, b: u32) -> u32 {
     mix(mix(a ^ 0x9e37_79b9).wrapping_add(b ^ 0x7f4a_7c15))
 }
 
-/// [0, 1]² onto [-1, 1]².
+/// Maps [0, 1]² onto [-1, 1]².
 pub fn square_from_unit(point: DVec2) -> DVec2 {
     2.0 * point - DVec2::ONE
 }
 
-/// Centre in [-1, 1]² of the cell in (row, column) of a `resolution`² grid: columns along x, rows
-/// along y. Opposite cells have exactly opposite centres.
+/// Centre in [-1, 1]² of cell (row, column) of a `resolution`² grid, with columns along x and rows along y.
+/// Opposite cells have exactly opposite centres.
 pub fn cell_center(resolution: usize, row: usize, column: usize) -> DVec2 {
     let n = resolution as f64;
     let along = |k: usize| ((2 * k + 1) as f64 - n) / n;
     DVec2::new(along(column), along(row))
 }
 
-/// The concentric map of Shirley and Chiu from [-1, 1]² onto the unit disk. It keeps ratios of areas, and
+/// The concentric map of Shirley and Chiu from [-1, 1]² onto the unit disk. It keeps ratios of areas and
 /// takes concentric squares to concentric circles.
 pub fn disk_from_square(square: DVec2) -> DVec2 {
     let DVec2 { x: a, y: b } = square;
@@ -75,7 +74,7 @@ pub fn disk_from_square(square: DVec2) -> DVec2 {
         let (sine, cosine) = libm::sincos(FRAC_PI_4 * (a / b));
         DVec2::new(b * sine, b * cosine)
     } else {
-        // Sine and cosine of π/4 round to different numbers, which would break the symmetry here.
+        // Sine and cosine of π/4 round to different numbers, which would break the symmetry.
         FRAC_1_SQRT_2 * square
     }
 }
@@ -95,11 +94,11 @@ pub fn square_from_disk(disk: DVec2) -> DVec2 {
     }
 }
 
-/// Unit direction with z >= 0 of density cos θ / π a steradian: the disk lifted onto the
-/// hemisphere (Malley's method).
+/// Unit direction with z >= 0, of density cos θ / π per steradian: the disk lifted onto the hemisphere
+/// (Malley's method).
 pub fn cosine_hemisphere_from_square(square: DVec2) -> DVec3 {
     let radius = square.x.abs().max(square.y.abs());
-    // The product keeps the digits of z near the rim, where 1 - radius² would lose them.
+    // Near the rim this product keeps the digits of z that 1 - radius² would lose.
     let z = ((1.0 - radius) * (1.0 + radius)).max(0.0).sqrt();
     disk_from_square(square).extend(z)
 }
@@ -109,8 +108,8 @@ pub fn square_from_cosine_hemisphere(direction: DVec3) -> DVec2 {
     square_from_disk(direction.truncate())
 }
 
-/// Unit direction with z >= 0 of density 1 / 2π a steradian: equal areas of the square become equal
-/// solid angles.
+/// Unit direction with z >= 0, of density 1 / 2π per steradian: equal areas of the square become equal solid
+/// angles.
 pub fn uniform_hemisphere_from_square(square: DVec2) -> DVec3 {
     let radius = square.x.abs().max(square.y.abs());
     let squared = radius * radius;
@@ -123,8 +122,8 @@ pub fn square_from_uniform_hemisphere(direction: DVec3) -> DVec2 {
     square_from_disk(direction.truncate() / (1.0 + direction.z).sqrt())
 }
 
-/// Unit direction of density 1 / 4π a steradian: x of the square is the azimuth in units of π,
-/// y the z coordinate (Archimedes).
+/// Unit direction of density 1 / 4π per steradian. x of the square is the azimuth in units of π, and y is the
+/// z coordinate (Archimedes).
 pub fn sphere_from_square(square: DVec2) -> DVec3 {
     let z = square.y;
     let radius = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
@@ -137,8 +136,8 @@ pub fn square_from_sphere(direction: DVec3) -> DVec2 {
     DVec2::new(libm::atan2(direction.y, direction.x) / PI, direction.z)
 }
 
-/// The second dimension of the Sobol' sequence, as a binary fraction of 2^32: the matrix of the
-/// polynomial x + 1, whose columns are the rows of Pascal's triangle modulo 2.
+/// The second dimension of the Sobol' sequence, in units of 2^-32. Its generator matrix belongs to the
+/// polynomial x + 1; the columns are rows of Pascal's triangle modulo 2.
 fn sobol_second_dimension(mut index: u32) -> u32 {
     let mut bits = 0;
     let mut column = 1 << 31;
@@ -152,7 +151,7 @@ fn sobol_second_dimension(mut index: u32) -> u32 {
     bits
 }
 
-/// Owen's scrambling of a binary fraction: each bit is flipped or not by a hash of the bits above it
+/// Owen's scrambling of a binary fraction: a hash of the bits above a bit decides whether it is flipped
 /// (Burley, section 3, with the permutation of Laine and Karras).
 fn nested_uniform_scramble(fraction: u32, seed: u32) -> u32 {
     let mut x = fraction.reverse_bits().wrapping_add(seed);
@@ -162,7 +161,7 @@ fn nested_uniform_scramble(fraction: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// A binary fraction of 2^32, exactly.
+/// The number `bits` / 2^32, exactly.
 fn unit_from_bits(bits: u32) -> f64 {
     f64::from(bits) / 4_294_967_296.0
 }
@@ -183,7 +182,7 @@ mod tests {
     proptest! {
         #[test]
         fn maps_are_undone_by_their_inverses(point in square()) {
-            // A few roundings; those of the sphere lie where z no longer tells the radius.
+            // A few roundings. Those of the sphere matter near the poles, where z hardly tells the radius.
             let close = |back: DVec2| (back - point).abs().max_element() < 1e-14;
             prop_assert!(close(square_from_disk(disk_from_square(point))));
             let cosine = cosine_hemisphere_from_square(point);
@@ -206,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_and_center_map_where_they_should() {
+    fn the_center_stays_and_corners_map_to_the_rim() {
         assert_eq!(disk_from_square(DVec2::ZERO), DVec2::ZERO);
         assert_eq!(square_from_disk(DVec2::ZERO), DVec2::ZERO);
         let corner = disk_from_square(DVec2::ONE);
@@ -259,7 +258,7 @@ mod tests {
         }
     }
 
-    /// Root mean square of the local discrepancy over boxes at the origin (Warnock's formula).
+    /// Root mean square of the discrepancy of boxes at the origin (Warnock's formula).
     fn l2_star_discrepancy(points: &[DVec2]) -> f64 {
         let n = points.len() as f64;
         let one: f64 = points
@@ -279,11 +278,11 @@ mod tests {
     #[test]
     fn discrepancy_is_far_below_that_of_random_points() {
         let count = 1024;
-        // Expected square for independent points: (1/4 - 1/9) / n.
+        // For independent points the expected square is (1/4 - 1/9) / n.
         let random = ((0.25 - 1.0 / 9.0) / f64::from(count)).sqrt();
         let sobol: Vec<_> = (0..count).map(|i| sobol_point(i, 42)).collect();
         let hammersley: Vec<_> = (0..count).map(|i| hammersley_point(i, count)).collect();
-        // Hammersley's set keeps a point on both axes, which biases it; scrambling removes that.
+        // Hammersley's set has points on both axes, which biases it. Scrambling removes the bias.
         for (points, factor) in [(sobol, 12.0), (hammersley, 5.0)] {
             let found = l2_star_discrepancy(&points);
             assert!(found < random / factor, "{found} against {random}");
@@ -297,7 +296,7 @@ mod tests {
             .map(|i| (sobol_point(i, 1).x - 0.5) * (sobol_point(i, 2).x - 0.5))
             .sum::<f64>()
             / f64::from(count);
-        // Deviation of such a mean for independent points: 1/12 / sqrt(4096).
+        // For independent points the deviation of this mean is 1/12 / √4096.
         assert!(mean.abs() < 4.0 / 12.0 / 64.0, "{mean}");
     }
 
@@ -325,7 +324,7 @@ mod tests {
             (sphere(|d| d.x * d.y), 0.0),
         ];
         for (k, (found, expected)) in cases.into_iter().enumerate() {
-            // Smooth integrands over a scrambled net: error near n^-1.5 times a small factor.
+            // For smooth integrands a scrambled net errs by about n^-1.5 times a small factor.
             assert!(
                 (found - expected).abs() < 2e-4,
                 "case {k}: {found} and {expected}"
@@ -349,6 +348,6 @@ mod tests {
         );
     }
 
-    /// Recorded on x86-64; the same on every machine.
+    /// Recorded on x86-64. It is the same on every machine.
     const FROZEN_DIGEST: u32 = 0xcfa0_715a;
 }

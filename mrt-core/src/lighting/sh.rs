@@ -1,17 +1,17 @@
-//! Real spherical harmonics up to order five: evaluation, projection, rotation, and the step from
-//! radiance to irradiance.
+//! Real spherical harmonics up to order five: evaluation, projection, rotation, and the step from radiance
+//! to irradiance.
 //!
-//! Order n means the bands l = 0 .. n-1, n² functions. Function (l, m) has index l² + l + m with m
-//! from -l to l, which for the first nine is 1, y, z, x, xy, yz, 3z²-1, xz, x²-y². All are
-//! orthonormal over the sphere, and carry no Condon-Shortley sign: each of these nine has a positive
-//! factor. Everywhere the order is read from the length of the slice: 1, 4, 9, 16 or 25.
+//! Order n means the bands l = 0 .. n-1, which have n² functions. Function (l, m), with m from -l to l, has
+//! index l² + l + m. The first nine are 1, y, z, x, xy, yz, 3z²-1, xz, x²-y², each with a positive factor,
+//! since there is no Condon-Shortley sign. All functions are orthonormal over the sphere. Every function here
+//! reads the order from the length of a slice: 1, 4, 9, 16 or 25.
 //!
 //! Sources: P.-P. Sloan, "Stupid Spherical Harmonics (SH) Tricks", 2008, appendix A1 (recurrences);
 //! R. Ramamoorthi and P. Hanrahan, "An Efficient Representation for Irradiance Environment Maps", 2001,
-//! equations 7 to 9 (irradiance); J. Ivanic and K. Ruedenberg, J. Phys. Chem. 1996, 100, 6342 with
-//! the correction of 1998, 102, 9099 (rotation).
+//! equations 7 to 9 (irradiance); J. Ivanic and K. Ruedenberg, J. Phys. Chem. 1996, 100, 6342, with the
+//! correction of 1998, 102, 9099 (rotation).
 
-use crate::linalg::matrix::{Matrix, Scalar};
+use crate::linalg::matrix::{Matrix, Real};
 use glam::{DMat3, DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -21,11 +21,11 @@ pub const MAX_ORDER: usize = 5;
 /// Number of functions of the highest order.
 pub const MAX_COEFFICIENTS: usize = MAX_ORDER * MAX_ORDER;
 
-/// What convolution with the clamped cosine lobe multiplies each band by: it turns the coefficients
-/// of radiance into those of irradiance as a function of the normal.
+/// The factor of each band in a convolution with the clamped cosine, which turns coefficients of radiance
+/// into those of irradiance as a function of the normal.
 pub const COSINE_LOBE: [f64; MAX_ORDER] = [PI, 2.0 * PI / 3.0, PI / 4.0, 0.0, -PI / 24.0];
 
-/// Position of function (l, m), with m from -l to l.
+/// Index of function (l, m), with m from -l to l.
 pub const fn index(l: usize, m: isize) -> usize {
     (l * l + l).wrapping_add_signed(m)
 }
@@ -33,7 +33,7 @@ pub const fn index(l: usize, m: isize) -> usize {
 /// The order n of a slice of n² coefficients, 1 to [`MAX_ORDER`].
 ///
 /// # Panics
-/// If the length is no such square.
+/// If the number is not 1, 4, 9, 16 or 25.
 pub fn order_of(coefficient_count: usize) -> usize {
     (1..=MAX_ORDER)
         .find(|n| n * n == coefficient_count)
@@ -47,9 +47,9 @@ pub fn order_of(coefficient_count: usize) -> usize {
 pub fn evaluate(direction: DVec3, basis: &mut [f64]) {
     let order = order_of(basis.len());
     let DVec3 { x, y, z } = direction;
-    // Real and imaginary part of (x + i y)^m: sin^m(theta) times cos and sin of m times the azimuth.
+    // Real and imaginary part of (x + i y)^m, which are sin^m θ times cos(m φ) and sin(m φ).
     let (mut cosine, mut sine) = (1.0, 0.0);
-    // The Legendre function P_m^m without its sine factor and sign: (2m - 1)!!.
+    // The Legendre function P_m^m without its factor sin^m θ and its sign: (2m - 1)!!.
     let mut sectoral = 1.0;
     for m in 0..order {
         let (mut previous, mut legendre) = (0.0, sectoral);
@@ -68,7 +68,7 @@ pub fn evaluate(direction: DVec3, basis: &mut [f64]) {
     }
 }
 
-/// [`evaluate`] for the frame: computed in `f64`, rounded once.
+/// [`evaluate`] for `f32`: computed in `f64` and rounded once.
 ///
 /// # Panics
 /// If the length of `basis` is not 1, 4, 9, 16 or 25.
@@ -81,19 +81,19 @@ pub fn evaluate_f32(direction: Vec3, basis: &mut [f32]) {
     }
 }
 
-/// The function that `coefficients` stand for, in a unit direction.
+/// Value of the function with the given `coefficients` in a unit direction.
 ///
 /// # Panics
 /// If their number is not 1, 4, 9, 16 or 25.
-pub fn value<T: Scalar>(coefficients: &[T], direction: DVec3) -> f64 {
+pub fn value<T: Real>(coefficients: &[T], direction: DVec3) -> f64 {
     with_basis(coefficients.len(), direction, |basis| {
         let terms = coefficients.iter().zip(basis);
         terms.map(|(c, b)| c.to_f64() * b).sum()
     })
 }
 
-/// Adds `weighted_value` times each function to `coefficients`: one sample of a projection, whose
-/// weight is the solid angle (in steradians) that the sample stands for.
+/// Adds one sample of a projection: `weighted_value` times each function. The value is weighted by the solid
+/// angle, in steradians, that the sample stands for.
 ///
 /// # Panics
 /// If the number of coefficients is not 1, 4, 9, 16 or 25.
@@ -105,8 +105,8 @@ pub fn add_sample(direction: DVec3, weighted_value: f64, coefficients: &mut [f64
     });
 }
 
-/// Coefficients of `f` up to `order`, by a quadrature that is exact where `f` is a polynomial of at
-/// most `degree` in x, y and z.
+/// Coefficients of `f` up to `order`, by a quadrature that is exact if `f` is a polynomial in x, y and z of at
+/// most the given `degree`.
 ///
 /// Cost: about (`degree` + `order`)² / 2 calls of `f`.
 ///
@@ -120,8 +120,10 @@ pub fn project(order: usize, degree: usize, mut f: impl FnMut(DVec3) -> f64) -> 
     coefficients
 }
 
-/// Unit directions and weights (in steradians, sum 4π) that integrate every polynomial in x, y, z of at
-/// most `degree` over the sphere exactly: Gauss-Legendre points in z times equal steps of azimuth.
+/// Unit directions and weights, in steradians, of a quadrature over the sphere that is exact for polynomials
+/// in x, y and z of at most the given `degree`. The weights add up to 4π.
+///
+/// It is the product of a Gauss-Legendre rule in z and equal steps of azimuth.
 pub fn sphere_quadrature(degree: usize) -> Vec<(DVec3, f64)> {
     let (rings, azimuths) = (degree / 2 + 1, degree + 1);
     let mut points = Vec::with_capacity(rings * azimuths);
@@ -138,10 +140,10 @@ pub fn sphere_quadrature(degree: usize) -> Vec<(DVec3, f64)> {
     points
 }
 
-/// Rotation of coefficients, one square matrix of 2l + 1 rows a band.
+/// The matrices that rotate coefficients: one square matrix of 2l + 1 rows for each band.
 ///
-/// With g(ω) = f(R⁻¹ω), the rotated function, band l of g is `bands[l]` times band l of f. Exact to
-/// rounding. `rotation` may also be improper (a mirror image): any orthogonal matrix will do.
+/// Let g(ω) = f(R⁻¹ω) be the rotated function. Then band l of g is `bands[l]` times band l of f, exact to
+/// rounding. `rotation` may be any orthogonal matrix, mirrors included.
 ///
 /// # Panics
 /// If `order` is not 1 to [`MAX_ORDER`].
@@ -192,16 +194,16 @@ pub fn irradiance_from_radiance(coefficients: &mut [f64]) {
     }
 }
 
-/// Irradiance on a surface of unit `normal` under incident radiance given by its coefficients, in
-/// the unit of radiance times steradian.
+/// Irradiance on a surface with unit `normal`, from the coefficients of the incident radiance. Its unit is
+/// that of radiance times steradian.
 ///
-/// With nine coefficients a distant light errs by at most 9.4 % of its greatest irradiance, where it
-/// grazes, and the result may be as low as -4 % of that on the far side; broad light errs far less. The
-/// fourth band is zero.
+/// With nine coefficients, the irradiance of a distant light errs by at most 9.4 % of its maximum, where the
+/// light grazes the surface. On the far side it may be as low as -4 % of the maximum. Broad light errs far
+/// less. The fourth band adds nothing.
 ///
 /// # Panics
 /// If the number of coefficients is not 1, 4, 9, 16 or 25.
-pub fn irradiance<T: Scalar>(radiance: &[T], normal: DVec3) -> f64 {
+pub fn irradiance<T: Real>(radiance: &[T], normal: DVec3) -> f64 {
     with_basis(radiance.len(), normal, |basis| {
         let mut sum = 0.0;
         for (l, lobe) in COSINE_LOBE[..order_of(basis.len())].iter().enumerate() {
@@ -213,6 +215,7 @@ pub fn irradiance<T: Scalar>(radiance: &[T], normal: DVec3) -> f64 {
     })
 }
 
+/// Calls `f` with the first `count` functions in a direction.
 fn with_basis<R>(count: usize, direction: DVec3, f: impl FnOnce(&[f64]) -> R) -> R {
     let mut basis = [0.0; MAX_COEFFICIENTS];
     let basis = &mut basis[..count.min(MAX_COEFFICIENTS)];
@@ -227,7 +230,7 @@ const NORM: [[f64; MAX_ORDER]; MAX_ORDER] = {
     while l < MAX_ORDER {
         let mut m = 0;
         while m <= l {
-            // (2l + 1) / 4π * (l - m)! / (l + m)!, twice that for m > 0.
+            // The square is (2l + 1) / 4π * (l - m)! / (l + m)!, and twice that for m > 0.
             let mut square = (2 * l + 1) as f64 / (4.0 * PI);
             let mut k = l - m + 1;
             while k <= l + m {
@@ -242,8 +245,7 @@ const NORM: [[f64; MAX_ORDER]; MAX_ORDER] = {
     norm
 };
 
-/// Square root for constants, where `f64::sqrt` is not allowed: Newton's iteration, for arguments in
-/// [1e-8, 4].
+/// Square root of an argument in [1e-8, 4] by Newton's iteration, for constants: `f64::sqrt` is not `const`.
 const fn constant_sqrt(x: f64) -> f64 {
     let mut root = 2.0;
     let mut step = 0;
@@ -254,11 +256,11 @@ const fn constant_sqrt(x: f64) -> f64 {
     root
 }
 
-/// Point and weight k of the Gauss-Legendre rule of `count` points on [-1, 1], from the top down.
+/// Point and weight k of the Gauss-Legendre rule of `count` points on [-1, 1], in falling order of points.
 fn gauss_legendre(count: usize, k: usize) -> (f64, f64) {
     let mut z = libm::cos(PI * (k as f64 + 0.75) / (count as f64 + 0.5));
     let mut slope = 1.0;
-    // Newton from Tricomi's estimate squares its error each time; seven steps leave only rounding.
+    // Each Newton step squares the error of Tricomi's estimate. Seven leave only rounding.
     for _ in 0..7 {
         let (mut previous, mut legendre) = (0.0, 1.0);
         for l in 0..count {
@@ -271,8 +273,8 @@ fn gauss_legendre(count: usize, k: usize) -> (f64, f64) {
     (z, 2.0 / ((1.0 - z * z) * slope * slope))
 }
 
-/// Rotation of band l from those of band 1 and band l - 1: equations 8.1 and tables 1 and 2 of
-/// Ivanic and Ruedenberg, as corrected.
+/// The rotation of band l from those of bands 1 and l - 1: equations 8.1 and tables 1 and 2 of Ivanic and
+/// Ruedenberg, as corrected.
 fn next_band(l: isize, first: &Matrix<f64>, below: &Matrix<f64>) -> Matrix<f64> {
     let entry = |band: &Matrix<f64>, m: isize, n: isize| {
         let center = (band.rows() / 2) as isize;
@@ -287,7 +289,7 @@ fn next_band(l: isize, first: &Matrix<f64>, below: &Matrix<f64>) -> Matrix<f64> 
             - sign * entry(first, i, -1) * entry(below, m, -(sign as isize) * (l - 1))
     };
     let root_two_if = |condition: bool| if condition { 2f64.sqrt() } else { 1.0 };
-    // The term in v and that in w join m to its neighbours towards and away from zero.
+    // The terms with factors v and w take m to its neighbours towards zero and away from zero.
     let towards_zero = |m: isize, n: isize| match m {
         0 => product(1, 1, n) + product(-1, -1, n),
         1 => root_two_if(true) * product(1, 0, n),
@@ -320,7 +322,7 @@ fn next_band(l: isize, first: &Matrix<f64>, below: &Matrix<f64>) -> Matrix<f64> 
         } else {
             -0.5 * root((l - a - 1) * (l - a))
         };
-        // A factor of zero goes with a term outside the lower band.
+        // Where a factor is zero, its term would lie outside the lower band.
         let mut sum = v * towards_zero(m, n);
         if u != 0.0 {
             sum += u * product(0, m, n);
@@ -394,7 +396,7 @@ mod tests {
         let mut narrow = [0.0f32; 9];
         evaluate_f32(d.as_vec3(), &mut narrow);
         for (k, &value) in narrow.iter().enumerate() {
-            // The direction was rounded too.
+            // The direction is rounded too.
             assert!((f64::from(value) - basis[k]).abs() < 3e-7);
         }
     }
@@ -465,8 +467,8 @@ mod tests {
         irradiance_from_radiance(&mut coefficients);
         let folded = value(&coefficients, normal);
         assert!((folded - irradiance(&radiance, normal)).abs() < ROUNDING);
-        // Integrate in the frame of the normal, over the upper hemisphere: the kink of the clamped
-        // cosine then lies on the edge of the domain, and z = cos theta is integrated in [0, 1].
+        // In the frame of the normal, the kink of the clamped cosine is the edge of the upper hemisphere,
+        // where z = cos θ runs from 0 to 1.
         let frame = DQuat::from_rotation_arc(DVec3::Z, normal);
         let (rings, azimuths) = (12, 16);
         let mut sum = 0.0;
@@ -480,7 +482,7 @@ mod tests {
                 sum += value(&radiance, frame * local) * z * weight * 2.0 * PI / azimuths as f64;
             }
         }
-        // Odd powers of the radius remain only in terms that the azimuths cancel.
+        // Odd powers of the radius occur only in terms that the sum over azimuths cancels.
         assert!((sum - folded).abs() < 1e-12, "{sum} and {folded}");
     }
 
@@ -493,7 +495,7 @@ mod tests {
 
     #[test]
     fn the_cosine_lobe_has_its_closed_form() {
-        // A_l = 2π times the integral of P_l(z) z over [0, 1].
+        // A_l is 2π times the integral of P_l(z) z over [0, 1].
         let legendre: [fn(f64) -> f64; 5] = [
             |_| 1.0,
             |z| z,
@@ -524,7 +526,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "10 coefficients")]
-    fn an_odd_number_of_coefficients_is_refused() {
+    fn a_number_of_coefficients_that_is_no_square_is_refused() {
         evaluate(DVec3::Z, &mut [0.0; 10]);
     }
 }

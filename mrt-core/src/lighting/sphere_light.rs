@@ -1,12 +1,12 @@
-//! Irradiance from small sources.
+//! Irradiance from spherical lights.
 
 use glam::DVec3;
 
-/// Irradiance per unit radiant intensity at a surface with unit `normal`, from an isotropic spherical
-/// source of the given radius whose centre stands at `offset` from the surface point, in 1/m².
+/// Irradiance per unit of radiant intensity, in 1/m², from an isotropic sphere of the given `radius` (m) on
+/// a surface with unit `normal`. `offset` (m) leads from the surface point to the centre of the sphere.
 ///
-/// `cos θ / max(d², r²)`: exact for an unoccluded diffuse sphere that is wholly above the horizon, and
-/// bounded by 1/r² where a surface touches or enters the sphere. Zero behind the surface.
+/// It is `cos θ / max(d², r²)`: exact for an unoccluded diffuse sphere that is wholly above the horizon, and
+/// at most 1/r² where a surface touches or enters the sphere. Zero behind the surface.
 pub fn sphere_light_irradiance(offset: DVec3, normal: DVec3, radius: f64) -> f64 {
     let squared = offset.length_squared();
     let bounded = squared.max(radius * radius);
@@ -22,7 +22,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn falls_with_the_square_and_stays_bounded() {
+    fn irradiance_falls_with_the_square_of_the_distance_and_is_bounded() {
         let at = |d: f64| sphere_light_irradiance(DVec3::Y * d, DVec3::Y, 0.1);
         assert_eq!(at(2.0), 0.25);
         assert_eq!(at(0.01), at(0.1));

@@ -1,14 +1,14 @@
 //! Dense column-major matrices, views into borrowed storage, and the products between them.
 //!
-//! Every product here is the scalar reference: each output element is summed in one fixed order,
-//! so the bits depend neither on the instruction set nor on how callers split the columns over
-//! threads. Bakes use them; frames have kernels of their own ([`tiles`](crate::simd::tiles)).
+//! Every product here is a reference: each output element is summed in one fixed order, so the bits
+//! depend neither on the instruction set nor on how callers split the columns over threads. Bakes use
+//! these products; frames have kernels of their own ([`tiles`](crate::simd::tiles)).
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Mul, Range};
 
-/// The two element types: `f32` at run time, `f64` in bakes.
-pub trait Scalar:
+/// The number types of matrices: `f32` at run time, `f64` in bakes.
+pub trait Real:
     Copy
     + Default
     + PartialEq
@@ -26,7 +26,7 @@ pub trait Scalar:
     fn to_f64(self) -> f64;
 }
 
-impl Scalar for f32 {
+impl Real for f32 {
     fn from_f64(value: f64) -> Self {
         value as f32
     }
@@ -35,7 +35,7 @@ impl Scalar for f32 {
     }
 }
 
-impl Scalar for f64 {
+impl Real for f64 {
     fn from_f64(value: f64) -> Self {
         value
     }
@@ -60,7 +60,7 @@ pub struct MatrixView<'a, T> {
     data: &'a [T],
 }
 
-impl<T: Scalar> Matrix<T> {
+impl<T: Real> Matrix<T> {
     /// A rows x columns matrix of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
         Self {
@@ -77,7 +77,7 @@ impl<T: Scalar> Matrix<T> {
         })
     }
 
-    /// Element by element from `f(row, column)`.
+    /// The rows x columns matrix whose elements are `f(row, column)`.
     pub fn from_fn(rows: usize, columns: usize, mut f: impl FnMut(usize, usize) -> T) -> Self {
         let mut data = Vec::with_capacity(rows * columns);
         for j in 0..columns {
@@ -92,7 +92,7 @@ impl<T: Scalar> Matrix<T> {
         }
     }
 
-    /// Takes column-major storage.
+    /// Takes ownership of column-major elements.
     ///
     /// # Panics
     /// If `data.len() != rows * columns`.
@@ -105,7 +105,10 @@ impl<T: Scalar> Matrix<T> {
         }
     }
 
-    /// Columns side by side; all must have `rows` entries.
+    /// Places columns side by side.
+    ///
+    /// # Panics
+    /// If a column does not have `rows` entries.
     pub fn from_columns<C: AsRef<[T]>>(rows: usize, columns: &[C]) -> Self {
         let mut data = Vec::with_capacity(rows * columns.len());
         for column in columns {
@@ -131,15 +134,18 @@ impl<T: Scalar> Matrix<T> {
     pub fn data(&self) -> &[T] {
         &self.data
     }
-    /// Column-major elements, to write.
+    /// Column-major elements, mutable.
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
-    /// One column.
+    /// Column `j`.
+    ///
+    /// # Panics
+    /// If there is no such column.
     pub fn column(&self, j: usize) -> &[T] {
         &self.data[j * self.rows..(j + 1) * self.rows]
     }
-    /// All of it, borrowed.
+    /// The whole matrix, borrowed.
     pub fn view(&self) -> MatrixView<'_, T> {
         MatrixView {
             rows: self.rows,
@@ -147,7 +153,10 @@ impl<T: Scalar> Matrix<T> {
             data: &self.data,
         }
     }
-    /// A run of whole columns, borrowed.
+    /// A range of columns, borrowed.
+    ///
+    /// # Panics
+    /// If the range ends beyond the last column.
     pub fn columns_view(&self, range: Range<usize>) -> MatrixView<'_, T> {
         MatrixView {
             rows: self.rows,
@@ -155,25 +164,34 @@ impl<T: Scalar> Matrix<T> {
             data: &self.data[range.start * self.rows..range.end * self.rows],
         }
     }
-    /// A copy with rows and columns exchanged.
+    /// The transpose, as a copy.
     pub fn transposed(&self) -> Self {
         Self::from_fn(self.columns, self.rows, |i, j| self[(j, i)])
     }
     /// A copy of the first `count` columns.
+    ///
+    /// # Panics
+    /// If there are fewer.
     pub fn leading_columns(&self, count: usize) -> Self {
         Self::from_column_major(self.rows, count, self.data[..count * self.rows].to_vec())
     }
     /// A copy with column j multiplied by `scales[j]`.
+    ///
+    /// # Panics
+    /// If there is not one scale for each column.
     pub fn scaled_columns(&self, scales: &[T]) -> Self {
         assert_eq!(scales.len(), self.columns, "one scale a column");
         Self::from_fn(self.rows, self.columns, |i, j| self[(i, j)] * scales[j])
     }
-    /// A copy of the named rows, in that order.
+    /// A copy of the rows with the given indices, in the given order.
+    ///
+    /// # Panics
+    /// If a row does not exist.
     pub fn selected_rows(&self, rows: &[usize]) -> Self {
         Self::from_fn(rows.len(), self.columns, |i, j| self[(rows[i], j)])
     }
-    /// Every element converted to another scalar type.
-    pub fn cast<S: Scalar>(&self) -> Matrix<S> {
+    /// A copy with every element converted to another number type.
+    pub fn cast<S: Real>(&self) -> Matrix<S> {
         Matrix {
             rows: self.rows,
             columns: self.columns,
@@ -203,8 +221,8 @@ impl<T> std::ops::IndexMut<(usize, usize)> for Matrix<T> {
     }
 }
 
-impl<'a, T: Scalar> MatrixView<'a, T> {
-    /// Borrows column-major storage.
+impl<'a, T: Real> MatrixView<'a, T> {
+    /// Borrows column-major elements.
     ///
     /// # Panics
     /// If `data.len() != rows * columns`.
@@ -224,7 +242,10 @@ impl<'a, T: Scalar> MatrixView<'a, T> {
     pub fn columns(&self) -> usize {
         self.columns
     }
-    /// One column.
+    /// Column `j`.
+    ///
+    /// # Panics
+    /// If there is no such column.
     pub fn column(&self, j: usize) -> &'a [T] {
         &self.data[j * self.rows..(j + 1) * self.rows]
     }
@@ -234,13 +255,13 @@ impl<'a, T: Scalar> MatrixView<'a, T> {
     }
 }
 
-/// `out += a * b` with `out` column-major, `a.rows()` x `b.columns()`.
+/// `out += a * b`, where `out` is column-major and `a.rows()` x `b.columns()`.
 ///
 /// Each element adds its products in the order of `a`'s columns.
 ///
 /// # Panics
 /// If the shapes do not fit.
-pub fn multiply_add<T: Scalar>(a: MatrixView<T>, b: MatrixView<T>, out: &mut [T]) {
+pub fn multiply_add<T: Real>(a: MatrixView<T>, b: MatrixView<T>, out: &mut [T]) {
     assert_eq!(a.columns, b.rows, "inner dimensions");
     assert_eq!(out.len(), a.rows * b.columns, "output storage");
     if a.rows == 0 {
@@ -268,31 +289,31 @@ pub fn multiply_add<T: Scalar>(a: MatrixView<T>, b: MatrixView<T>, out: &mut [T]
     }
 }
 
-/// `a * b` in new storage.
+/// The product `a * b`.
 ///
 /// # Panics
 /// If the shapes do not fit.
-pub fn multiply<T: Scalar>(a: MatrixView<T>, b: MatrixView<T>) -> Matrix<T> {
+pub fn multiply<T: Real>(a: MatrixView<T>, b: MatrixView<T>) -> Matrix<T> {
     let mut out = Matrix::zeros(a.rows, b.columns);
     multiply_add(a, b, &mut out.data);
     out
 }
 
-/// `aᵀ * b` in new storage: a matrix of [`dot`] products of columns.
+/// The product `aᵀ * b`: a matrix of [`dot`] products of columns.
 ///
 /// # Panics
 /// If the shapes do not fit.
-pub fn transpose_multiply<T: Scalar>(a: MatrixView<T>, b: MatrixView<T>) -> Matrix<T> {
+pub fn transpose_multiply<T: Real>(a: MatrixView<T>, b: MatrixView<T>) -> Matrix<T> {
     assert_eq!(a.rows, b.rows, "inner dimensions");
     Matrix::from_fn(a.columns, b.columns, |i, j| dot(a.column(i), b.column(j)))
 }
 
-/// Scalar product, summed in eight interleaved partial sums that are then added pairwise; the
-/// order is part of the definition, so a vector unit of any width can follow it.
+/// Scalar product, in eight interleaved partial sums that are then added pairwise. The order is part of
+/// the definition; a vector unit of any width can follow it.
 ///
 /// # Panics
 /// If the lengths differ.
-pub fn dot<T: Scalar>(a: &[T], b: &[T]) -> T {
+pub fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     const LANES: usize = 8;
     assert_eq!(a.len(), b.len(), "vector lengths");
     let mut sums = [T::default(); LANES];
@@ -314,6 +335,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// Two matrices of small integers that can be multiplied.
     fn small() -> impl Strategy<Value = (Matrix<f64>, Matrix<f64>)> {
         (1usize..12, 1usize..12, 1usize..12).prop_flat_map(|(m, k, n)| {
             let entries = |count| prop::collection::vec(-8i32..8, count);

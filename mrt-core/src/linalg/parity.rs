@@ -1,25 +1,29 @@
 //! Splitting signals on a symmetric set of points into parity classes.
 //!
-//! When mirrors that commute with one another map a point set to itself, every signal on it is a sum
-//! of one part a class, each even or odd under each mirror. An operator that respects the mirrors never
-//! mixes classes, so it can be decomposed class by class: smaller problems, and singular vectors whose
-//! parity is exact rather than whatever rounding made of a degenerate pair.
+//! Let mirrors that commute with one another map a point set to itself. Then every signal on the points
+//! is a sum of parts, one for each class; a class says under which mirrors its part is odd. An operator
+//! that respects the mirrors never mixes classes, so it can be decomposed class by class. The problems
+//! are smaller, and the parity of singular vectors is exact: without classes, rounding decides how the
+//! vectors of equal singular values mix.
 
 use crate::linalg::matrix::Matrix;
 
-/// The parity classes of a point set under m commuting mirrors: 2^m of them.
+/// The 2^m parity classes of a point set under m commuting mirrors.
+///
+/// Bit k of a class says that its signals are odd under mirror k. The products of mirrors make a group of
+/// 2^m elements; bit k of an element says that mirror k takes part.
 #[derive(Clone, Debug)]
 pub struct ParityClasses {
     point_count: usize,
     mirrors: Vec<Vec<u32>>,
-    /// Each orbit lists (point, group element that takes the first point there).
+    /// Each orbit lists (point, group element that takes the first point of the orbit there).
     orbits: Vec<Vec<(u32, u32)>>,
-    /// For each class, the orbits that carry a signal of that parity.
+    /// By class: the orbits on which its signals can differ from zero.
     members: Vec<Vec<u32>>,
 }
 
 impl ParityClasses {
-    /// Classes under the given mirrors; each is a permutation of the points and its own inverse.
+    /// The classes under the given mirrors, each a permutation of the points that is its own inverse.
     ///
     /// # Panics
     /// If a mirror has the wrong length, is not its own inverse, or two do not commute.
@@ -59,7 +63,7 @@ impl ParityClasses {
                 }
             }
             for (class, list) in members.iter_mut().enumerate() {
-                // A point on a mirror plane carries no signal that is odd under that mirror.
+                // A signal that is odd under a mirror is zero at the points that the mirror keeps.
                 if stabilizer.iter().all(|&e| sign(class, e) > 0.0) {
                     list.push(orbits.len() as u32);
                 }
@@ -74,7 +78,7 @@ impl ParityClasses {
         }
     }
 
-    /// Number of classes, 2^mirrors.
+    /// Number of classes: two to the power of the number of mirrors.
     pub fn class_count(&self) -> usize {
         1 << self.mirrors.len()
     }
@@ -84,17 +88,18 @@ impl ParityClasses {
         self.point_count
     }
 
-    /// Coordinates that a signal has in a class; over all classes they add up to the points.
+    /// Number of coordinates of a class. Over all classes they add up to the number of points.
     pub fn dimension(&self, class: usize) -> usize {
         self.members[class].len()
     }
 
-    /// The orbits of the mirrors; each lists (point, group element that takes its first point there).
+    /// The orbits of the points under the mirrors. Each orbit lists (point, group element that takes the
+    /// first point of the orbit there).
     pub fn orbits(&self) -> impl Iterator<Item = &[(u32, u32)]> {
         self.orbits.iter().map(Vec::as_slice)
     }
 
-    /// Where a group element takes a point; bit k of the element says whether mirror k takes part.
+    /// Where a group element takes a point.
     pub fn image(&self, element: u32, point: u32) -> u32 {
         image(&self.mirrors, element, point)
     }
@@ -104,7 +109,10 @@ impl ParityClasses {
         sign(class, 1 << mirror)
     }
 
-    /// Orthonormal coordinates of the part of `signal` in a class.
+    /// The part of `signal` in a class, in orthonormal coordinates.
+    ///
+    /// # Panics
+    /// If the signal does not have one value for each point.
     pub fn fold(&self, class: usize, signal: &[f64]) -> Vec<f64> {
         assert_eq!(signal.len(), self.point_count, "signal length");
         self.members[class]
@@ -120,7 +128,11 @@ impl ParityClasses {
             .collect()
     }
 
-    /// The signal with the given class coordinates.
+    /// The signal with the given coordinates in a class and nothing in the others; inverse of
+    /// [`ParityClasses::fold`] for signals of the class.
+    ///
+    /// # Panics
+    /// If the number of coordinates is not that of the class.
     pub fn unfold(&self, class: usize, coordinates: &[f64]) -> Vec<f64> {
         assert_eq!(coordinates.len(), self.dimension(class), "coordinates");
         let mut signal = vec![0.0; self.point_count];
@@ -134,7 +146,7 @@ impl ParityClasses {
         signal
     }
 
-    /// [`ParityClasses::fold`] for every column.
+    /// [`ParityClasses::fold`] of every column.
     pub fn fold_columns(&self, class: usize, signals: &Matrix<f64>) -> Matrix<f64> {
         let columns: Vec<_> = (0..signals.columns())
             .map(|j| self.fold(class, signals.column(j)))
@@ -151,7 +163,7 @@ fn image(mirrors: &[Vec<u32>], element: u32, point: u32) -> u32 {
         .fold(point, |at, (_, mirror)| mirror[at as usize])
 }
 
-/// The character of `class` at a group element: -1 for each mirror that is in both.
+/// The character of `class` at a group element: a factor of -1 for each mirror that is in both.
 fn sign(class: usize, element: u32) -> f64 {
     if (class as u32 & element).count_ones().is_multiple_of(2) {
         1.0

@@ -1,33 +1,37 @@
-//! Truncated singular value decomposition in `f64`, through nalgebra, and the energy bookkeeping.
+//! Singular value decomposition and eigenvectors in `f64`, through nalgebra, and the energy that a
+//! truncation drops.
 //!
-//! A decomposition has the same bits on every machine: nalgebra is built without its run-time
-//! choice of instruction set, vectors are ordered by falling singular value, and signs are fixed.
+//! A decomposition has the same bits on every machine: nalgebra is built without its run-time choice of
+//! instruction set, vectors are ordered by falling singular value, and signs are fixed.
 
 mod jacobi;
 
-use crate::linalg::matrix::{Matrix, MatrixView, Scalar, multiply};
-use jacobi::one_sided_jacobi;
+use crate::linalg::matrix::{Matrix, MatrixView, Real, dot, multiply};
+use jacobi::{Factors, one_sided_jacobi};
 use nalgebra::DMatrix;
 
-/// Iterations for each row or column after which nalgebra's methods are given up: they take two or three, and on
-/// some matrices of low rank, where rotations underflow, they never end or give NaN.
+/// Number of iterations for each row or column after which nalgebra's methods are given up.
+///
+/// They take two or three. On some matrices of low rank, where rotations underflow, they never end or
+/// give NaN.
 const MAX_ITERATIONS: usize = 30;
 
 /// A thin decomposition `a = u * diag(singular_values) * vᵀ`, largest value first.
 #[derive(Clone, Debug)]
 pub struct Svd {
-    /// Left singular vectors, one a column.
+    /// Left singular vectors, as columns.
     pub u: Matrix<f64>,
-    /// Falling and not negative.
+    /// Singular values: falling, not negative.
     pub singular_values: Vec<f64>,
-    /// Right singular vectors, one a column.
+    /// Right singular vectors, as columns.
     pub v: Matrix<f64>,
 }
 
-/// Thin SVD of any matrix; each column of `u` has its largest entry positive (the first of equals).
+/// Thin singular value decomposition of any matrix.
 ///
-/// Cost: about `20 * m * n * min(m, n)` operations. Relative to the largest singular value errors are
-/// near 1e-15.
+/// In each column of `u` the entry of largest magnitude is positive (the first one, of equals). Errors
+/// are near 1e-15 of the largest singular value. Cost: about `20 * m * n * min(m, n)` operations for an
+/// m x n matrix.
 pub fn svd(a: MatrixView<f64>) -> Svd {
     let (rows, columns) = (a.rows(), a.columns());
     let rank = rows.min(columns);
@@ -38,7 +42,11 @@ pub fn svd(a: MatrixView<f64>) -> Svd {
             v: Matrix::zeros(columns, 0),
         };
     }
-    let (u, values, v) = decompose(a);
+    let Factors {
+        left: u,
+        values,
+        right: v,
+    } = decompose(a);
     let mut order: Vec<usize> = (0..rank).collect();
     order.sort_by(|&i, &j| values[j].total_cmp(&values[i]));
     let signs: Vec<f64> = order
@@ -52,8 +60,8 @@ pub fn svd(a: MatrixView<f64>) -> Svd {
     }
 }
 
-/// Left vectors, singular values and right vectors in any order.
-fn decompose(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Matrix<f64>) {
+/// Decomposes by nalgebra, or by Jacobi rotations if nalgebra gives up.
+fn decompose(a: MatrixView<f64>) -> Factors {
     let (rows, columns) = (a.rows(), a.columns());
     let epsilon = 5.0 * f64::EPSILON;
     let limit = MAX_ITERATIONS * rows.min(columns);
@@ -67,25 +75,33 @@ fn decompose(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Matrix<f64>) {
         let values = singular_values.as_slice().to_vec();
         let parts = [u.as_slice(), v_t.as_slice(), &values];
         if parts.iter().all(|part| part.iter().all(|x| x.is_finite())) {
-            return (
-                Matrix::from_column_major(rows, values.len(), u.as_slice().to_vec()),
+            return Factors {
+                left: Matrix::from_column_major(rows, values.len(), u.as_slice().to_vec()),
                 values,
-                Matrix::from_fn(columns, v_t.nrows(), |i, j| v_t[(j, i)]),
-            );
+                right: Matrix::from_fn(columns, v_t.nrows(), |i, j| v_t[(j, i)]),
+            };
         }
     }
     if rows >= columns {
         return one_sided_jacobi(a);
     }
     let transposed = Matrix::from_fn(columns, rows, |i, j| a.column(i)[j]);
-    let (v, values, u) = one_sided_jacobi(transposed.view());
-    (u, values, v)
+    let of_transposed = one_sided_jacobi(transposed.view());
+    Factors {
+        left: of_transposed.right,
+        values: of_transposed.values,
+        right: of_transposed.left,
+    }
 }
 
-/// Eigenvalues, falling, and eigenvectors of a symmetric matrix (only its lower triangle is read).
+/// Falling eigenvalues of a symmetric matrix, and its eigenvectors as columns. Only the lower triangle is
+/// read.
 ///
-/// For a tall matrix this is the cheap road to its right singular vectors (method of snapshots): the
+/// For a tall matrix `a` this is a cheap way to its right singular vectors (method of snapshots): the
 /// eigenvalues of `aᵀa` are squared singular values, good down to 1e-7 of the largest.
+///
+/// # Panics
+/// If the matrix is not square.
 pub fn symmetric_eigen(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
     let size = a.rows();
     assert_eq!(size, a.columns(), "a symmetric matrix is square");
@@ -110,32 +126,40 @@ fn decompose_symmetric(a: MatrixView<f64>) -> (Vec<f64>, Matrix<f64>) {
             return (values.to_vec(), vectors);
         }
     }
-    // Right vectors of a symmetric matrix are its eigenvectors; those of one value and its negative, if both
-    // occur, would be mixed, but the matrices that come here are of scalar products.
+    // The right singular vectors of a symmetric matrix are its eigenvectors. A value and its negative,
+    // if both occurred, would have mixed vectors. But matrices of scalar products, which come here, have
+    // no negative eigenvalues.
     let symmetric = Matrix::from_fn(size, size, |i, j| a.column(i.min(j))[i.max(j)]);
-    let (left, values, right) = one_sided_jacobi(symmetric.view());
+    let Factors {
+        left,
+        values,
+        right,
+    } = one_sided_jacobi(symmetric.view());
     let signed = (0..size)
         .map(|k| {
-            let sign = crate::linalg::matrix::dot(left.column(k), right.column(k));
+            let sign = dot(left.column(k), right.column(k));
             if sign < 0.0 { -values[k] } else { values[k] }
         })
         .collect();
     (signed, right)
 }
 
-/// Squarings in [`spectral_radius`]: the power 2^40 of a matrix of condition 1e300 is off by one part in
-/// 1e9.
+/// Number of squarings in [`spectral_radius`]. For a matrix of condition 1e300, the power 2^40 errs by
+/// one part in 1e9.
 const RADIUS_SQUARINGS: i32 = 40;
 
-/// Largest magnitude of the eigenvalues of a square matrix: the limit of `‖Aᵖ‖^(1/p)` (Gelfand), with p
-/// doubled by squaring.
+/// Largest magnitude of the eigenvalues of a square matrix: the limit of `‖Aᵖ‖^(1/p)` (Gelfand), where p
+/// is doubled by squaring.
 ///
-/// Eigenvalue solvers iterate until they converge, which nalgebra's does not for some of the nearly
-/// diagonal matrices that come up here; this always ends.
+/// This always ends. Eigenvalue solvers iterate until they converge, and nalgebra's does not converge for
+/// some nearly diagonal matrices.
+///
+/// # Panics
+/// If the matrix is not square.
 pub fn spectral_radius(a: MatrixView<f64>) -> f64 {
     assert_eq!(a.rows(), a.columns(), "a square matrix has eigenvalues");
     let mut power = Matrix::from_column_major(a.rows(), a.columns(), a.data().to_vec());
-    // log of the radius is the sum over squarings k of log(norm before it) / 2^k.
+    // The log of the radius is the sum, over squarings k, of log(norm before the squaring) / 2^k.
     let mut log_radius = 0.0;
     let mut share = 1.0;
     for _ in 0..RADIUS_SQUARINGS {
@@ -151,7 +175,8 @@ pub fn spectral_radius(a: MatrixView<f64>) -> f64 {
     libm::exp(log_radius)
 }
 
-/// Number of leading singular values whose squares hold at least `fraction` of the sum of squares.
+/// Smallest number of leading singular values whose squares make at least `fraction` of the sum of all
+/// squares.
 pub fn energy_rank(singular_values: &[f64], fraction: f64) -> usize {
     let total: f64 = singular_values.iter().map(|s| s * s).sum();
     let mut held = 0.0;
@@ -164,11 +189,11 @@ pub fn energy_rank(singular_values: &[f64], fraction: f64) -> usize {
     singular_values.len()
 }
 
-/// Fraction of the sum of squares beyond the first `kept` values, in [0, 1].
+/// Fraction of the sum of squares that lies beyond the first `kept` values, in [0, 1].
 pub fn dropped_energy(singular_values: &[f64], kept: usize) -> f64 {
     let total: f64 = singular_values.iter().map(|s| s * s).sum();
     let dropped: f64 = singular_values.iter().skip(kept).map(|s| s * s).sum();
-    // The empty sum of floats is -0.
+    // Adding 0 turns -0, the empty sum of floats, into 0.
     if total > 0.0 {
         dropped / total + 0.0
     } else {
@@ -176,8 +201,8 @@ pub fn dropped_energy(singular_values: &[f64], kept: usize) -> f64 {
     }
 }
 
-/// [`dropped_energy`] of what lies beyond the first value, for spectra whose first mode is there by
-/// decree, as large as one likes, and would make every other share look small.
+/// [`dropped_energy`] without the first value, for spectra whose first mode is prescribed. The size of
+/// that mode is arbitrary, and would make every other share look small.
 pub fn dropped_energy_beyond_first(singular_values: &[f64], kept: usize) -> f64 {
     dropped_energy(
         singular_values.get(1..).unwrap_or(&[]),
@@ -185,11 +210,11 @@ pub fn dropped_energy_beyond_first(singular_values: &[f64], kept: usize) -> f64 
     )
 }
 
-/// +1 or -1, the sign of the entry of largest magnitude.
+/// The sign of the entry of largest magnitude, +1 or -1.
 ///
-/// Entries within rounding of the largest tie, and the first of them decides: symmetric vectors have
-/// many equal magnitudes.
-pub fn largest_entry_sign<T: Scalar>(column: &[T]) -> f64 {
+/// Symmetric vectors have many entries of equal magnitude. So entries within a millionth of the largest
+/// magnitude tie, and the first of them decides.
+pub fn largest_entry_sign<T: Real>(column: &[T]) -> f64 {
     let largest = column
         .iter()
         .fold(0.0f64, |largest, x| largest.max(x.to_f64().abs()));
@@ -206,7 +231,7 @@ mod tests {
     use crate::linalg::matrix::transpose_multiply;
 
     fn sample(rows: usize, columns: usize) -> Matrix<f64> {
-        // Rank two plus a small full-rank part: spread-out and close singular values together.
+        // Rank two plus a small full-rank part: some singular values far apart, others close together.
         Matrix::from_fn(rows, columns, |i, j| {
             let (x, y) = (i as f64 + 1.0, j as f64 + 2.0);
             (x * 0.3).sin() * y + x * 0.01 * (y * 1.7).cos() + 1e-3 * ((i * 7 + j * 13) % 5) as f64
@@ -220,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn eigenvalues_of_columns_that_come_twice_are_those_of_the_columns_doubled() {
+    fn repeating_every_column_doubles_the_eigenvalues_of_the_gram_matrix() {
         for size in [1, 5, 40] {
             let once = sample(60, size);
             let columns: Vec<&[f64]> = (0..2 * size).map(|j| once.column(j % size)).collect();
@@ -230,7 +255,7 @@ mod tests {
             let (found, _) = symmetric_eigen(gram(&twice).view());
             for (k, value) in found.iter().enumerate() {
                 let expected = expected.get(k).map_or(0.0, |v| 2.0 * v);
-                // Rounding of the largest, times the dimension.
+                // Rounding of the largest value, times the dimension.
                 assert!(
                     (value - expected).abs() <= 1e-13 * found[0],
                     "{size} {k}: {value}"
@@ -267,9 +292,9 @@ mod tests {
     }
 
     #[test]
-    fn radius_is_that_of_the_largest_eigenvalue() {
-        // A scaled rotation, a nilpotent matrix, and a triangle with a large norm. Forty squarings
-        // leave the factors of the norm a part in 1e9.
+    fn the_spectral_radius_is_the_largest_magnitude_of_the_eigenvalues() {
+        // A scaled rotation, a nilpotent matrix, and a triangular one with a large norm. After forty
+        // squarings the norm counts for a part in 1e9.
         let cases = [
             (vec![0.0, 0.8, -0.8, 0.0], 0.8),
             (vec![0.0, 0.0, 5.0, 0.0], 0.0),
@@ -282,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn energy_counts_squares() {
+    fn energy_is_the_sum_of_squares() {
         let s = [3.0, 2.0, 1.0];
         assert_eq!(energy_rank(&s, 9.0 / 14.0), 1);
         assert_eq!(energy_rank(&s, 0.9), 2);

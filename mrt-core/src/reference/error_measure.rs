@@ -17,7 +17,7 @@ pub fn rel_l2(approximation: &[f64], reference: &[f64]) -> f64 {
 /// [`rel_l2`] over the walls at 0, 1, 2, and 3 or more openings from the light; `None` for a distance
 /// at which the level has no wall.
 ///
-/// `wall_hops` holds one distance a wall. Both vectors hold the same number of elements for each wall,
+/// `wall_hops` holds one distance for each wall. Both vectors hold the same number of elements for each wall,
 /// wall by wall. Walls that cannot be reached (`u32::MAX`) belong to no group.
 ///
 /// # Panics

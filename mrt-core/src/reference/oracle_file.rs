@@ -13,6 +13,6 @@ mod parse;
 mod folder;
 
 pub use error::ReferenceError;
-pub use folder::{oracle_folder, oracle_folder_or_report};
+pub use folder::{ground_truth_folder, oracle_folder};
 pub use parse::read;
 pub use reference_file::{Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceFile};

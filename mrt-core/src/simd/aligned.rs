@@ -1,4 +1,4 @@
-//! Buffers that begin at a cache line.
+//! Buffers that begin at the start of a cache line.
 
 #![allow(
     unsafe_code,
@@ -9,21 +9,25 @@ use bytemuck::{Pod, Zeroable};
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// What a cache line holds, and the widest vector.
+/// A cache line, which is also as large as the widest vector.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
-// SAFETY: zeros are numbers.
+// SAFETY: all bits zero is a number.
 unsafe impl Zeroable for Line {}
-// SAFETY: as large as it is aligned, so without padding, of numbers alone, and any bits are one.
+// SAFETY: its size is its alignment, so it has no padding; it holds numbers alone, and any bits are a
+// number.
 unsafe impl Pod for Line {}
 
-/// A vector of plain numbers that begins at a multiple of 64 bytes: where vectors of 16 lanes cross from one cache line to
-/// the next, each load and store takes two. Folding a block's light then takes 1.4 times as long, and unfolding it 1.2.
+/// A growable array of plain numbers that begins at a multiple of 64 bytes.
+///
+/// Elsewhere, vectors of 16 lanes cross from one cache line to the next, and each load and store takes
+/// two accesses: folding a block's light takes 1.4 times as long, and unfolding it 1.2 times.
 ///
 /// # Panics
-/// Everything panics for types larger than a cache line, or more aligned, or whose size does not divide one.
+/// Every method panics for a number type that is larger or more aligned than a cache line, or whose size
+/// does not divide that of a cache line.
 #[derive(Clone, Debug)]
 pub struct Aligned<T> {
     lines: Vec<Line>,
@@ -34,7 +38,7 @@ pub struct Aligned<T> {
 impl<T: Pod> Aligned<T> {
     const PER_LINE: usize = size_of::<Line>() / size_of::<T>();
 
-    /// None.
+    /// An empty array.
     pub const fn new() -> Self {
         Self {
             lines: Vec::new(),
@@ -43,7 +47,7 @@ impl<T: Pod> Aligned<T> {
         }
     }
 
-    /// So many zeros.
+    /// An array of `len` zeros.
     pub fn zeroed(len: usize) -> Self {
         Self {
             lines: vec![Line::zeroed(); len.div_ceil(Self::PER_LINE)],
@@ -63,7 +67,7 @@ impl<T: Pod> Aligned<T> {
         }
     }
 
-    /// Appends zeros until the next number begins a cache line.
+    /// Appends zeros until the next number would begin a cache line.
     pub fn fill_line(&mut self) {
         self.len = self.lines.len() * Self::PER_LINE;
     }
@@ -109,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_stand_at_cache_lines_and_are_what_was_pushed() {
+    fn numbers_begin_at_a_cache_line_and_are_those_pushed() {
         for count in [0, 1, 15, 16, 17, 100] {
             let mut numbers: Aligned<u16> = (0..count).collect();
             assert_eq!(numbers.as_ptr().align_offset(64), 0);

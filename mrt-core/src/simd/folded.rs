@@ -1,20 +1,22 @@
 //! Even and odd parts of signals under commuting mirrors, whole vectors at a time.
 //!
-//! A signal has `GROUP` parts of equal length, one for each element of the group that the mirrors make; position k of
-//! each is an image of position k of the others. Element bit j says that mirror j was applied. Sums and differences
-//! of parts are the signal's **classes**, class bit j saying odd under mirror j, and the same sums and differences of
-//! classes give the signal back, `GROUP` times over.
+//! The mirrors make a group of `GROUP` elements; bit j of an element says that mirror j was applied. A
+//! signal has one part for each element. Parts have equal length, and position k of each part is an
+//! image of position k of the others.
+//!
+//! Sums and differences of the parts are the **classes** of the signal; bit j of a class says odd under
+//! mirror j. The same sums and differences of the classes give the signal back, times `GROUP`.
 
 #![allow(
     unsafe_code,
     reason = "bounds are checked once a call, not once a number"
 )]
 
-use super::tiles::{CHANNELS, Element, Rgb, TILE};
-use super::{Lanes, WIDEST};
+use super::lanes::{Lanes, WIDEST};
+use super::tiles::{CHANNELS, PackedNumber, Rgb, TILE};
 use std::ops::Range;
 
-/// Sums and differences of mirrored parts, each mirror in turn.
+/// Classes from parts, or parts from classes: sums and differences, one mirror after another.
 #[inline(always)]
 fn butterflies<L: Lanes, const GROUP: usize>(l: L, v: &mut [L::V; GROUP]) {
     let mut step = 1;
@@ -32,44 +34,47 @@ fn butterflies<L: Lanes, const GROUP: usize>(l: L, v: &mut [L::V; GROUP]) {
     }
 }
 
-/// Albedo of a surface.
+/// Albedo of a surface, in [0, 1].
 #[derive(Clone, Copy, Debug)]
 pub enum Albedo<'a> {
-    /// The same everywhere that there is light, by channel.
+    /// One albedo for the whole surface, by channel.
     Uniform([f32; CHANNELS]),
-    /// The same everywhere, and the caller multiplies sums by it; taken as 1. Nothing is emitted.
+    /// One albedo for the whole surface, which the caller multiplies the sums by: here it counts as 1.
+    /// Only for surfaces that emit nothing.
     Later,
-    /// One number a number of light.
+    /// The albedo of every position, by channel.
     Each([&'a [f32]; CHANNELS]),
 }
 
-/// What a surface sends out: `albedo (direct + indirect) + emission`, by channel.
+/// Light on a surface, by channel. The surface sends out `albedo * (direct + indirect) + emission`.
 #[derive(Clone, Copy, Debug)]
 pub struct Reflected<'a> {
-    /// Irradiance.
+    /// Direct irradiance.
     pub direct: [&'a [f32]; CHANNELS],
-    /// More of it, or none.
+    /// Indirect irradiance, if any.
     pub indirect: Option<[&'a [f32]; CHANNELS]>,
-    /// In [0, 1].
+    /// Albedo of the surface.
     pub albedo: Albedo<'a>,
-    /// Radiosity, or none.
+    /// Emitted radiosity, if any.
     pub emission: Option<[&'a [f32]; CHANNELS]>,
 }
 
-/// Sums over a surface, by channel.
+/// Weighted sums over a surface, by channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Folded {
-    /// Of all that it sends out.
+    /// Sums of all that the surface sends out.
     pub all: [f32; CHANNELS],
-    /// Of what is not indirect.
+    /// Sums of all but reflected indirect irradiance.
     pub fresh: [f32; CHANNELS],
 }
 
-/// Folds what a surface sends out: class after class, in that channel after channel, each `weight.len()` numbers. Returns
-/// sums over the surface by `weight`.
+/// Folds what a surface sends out into classes, and returns sums over the surface, weighted by `weight`.
+///
+/// `folded` gets class after class, in a class channel after channel, in a channel `weight.len()` numbers.
 ///
 /// # Panics
-/// If a signal is not `GROUP` times as long as `weight`, that is no multiple of [`WIDEST`], or `folded` is too short.
+/// If a signal is not `GROUP` times as long as `weight`, the length of `weight` is not a multiple of
+/// [`WIDEST`], or `folded` is too short.
 #[inline(always)]
 pub fn fold<L: Lanes, const GROUP: usize>(
     l: L,
@@ -91,6 +96,7 @@ pub fn fold<L: Lanes, const GROUP: usize>(
     }
 }
 
+/// [`fold`], compiled for light that has or lacks each of its parts.
 #[inline(always)]
 fn fold_with<
     L: Lanes,
@@ -105,8 +111,9 @@ fn fold_with<
     folded: &mut [f32],
 ) -> Folded {
     let stride = weight.len();
-    let direct = light.direct;
     let zero = l.splat(0.0);
+    // A signal that there is not is replaced by the direct light, and not read.
+    let direct = light.direct;
     let (albedo, uniform) = match light.albedo {
         Albedo::Uniform([red, green, blue]) => {
             (direct, Some([l.splat(red), l.splat(green), l.splat(blue)]))
@@ -130,7 +137,8 @@ fn fold_with<
             let mut fresh_here = zero;
             for (element, v) in v.iter_mut().enumerate() {
                 let k = element * stride + at;
-                // SAFETY: element < GROUP and at + N <= stride, so k + N <= GROUP * stride, the length of every signal.
+                // SAFETY: element < GROUP and at + N <= stride, so k + N <= GROUP * stride, the length
+                // of every signal.
                 unsafe {
                     let albedo = match uniform {
                         Some(albedo) => albedo[channel],
@@ -163,7 +171,7 @@ fn fold_with<
                 fresh[channel] = l.mul_add(fresh_here, weight, fresh[channel]);
             }
             for (class, v) in v.iter().enumerate() {
-                // SAFETY: the last class's last channel ends at GROUP * CHANNELS * stride.
+                // SAFETY: the last channel of the last class ends at GROUP * CHANNELS * stride.
                 unsafe {
                     l.store_unchecked(folded, (class * CHANNELS + channel) * stride + at, *v)
                 };
@@ -188,14 +196,14 @@ fn sum_channels<L: Lanes>(l: L, [red, green, blue]: [L::V; CHANNELS]) -> [f32; C
     [red, green, blue]
 }
 
-/// A basis of signals, of which a mode's numbers at one texel of each orbit are kept.
+/// A basis of signals. It holds the numbers of every mode at one position of each orbit of the mirrors.
 #[derive(Clone, Copy, Debug)]
 pub struct Basis<'a, E> {
-    /// Tile after tile of [`TILE`] orbits; in a tile a column for each mode, class after class.
+    /// Tile after tile of [`TILE`] orbits. A tile has a column for each mode, class after class.
     pub tiles: &'a [E],
-    /// By class: which coefficients its modes are multiplied by.
+    /// By class: the range of coefficients that its modes are multiplied by.
     pub classes: &'a [Range<usize>],
-    /// By orbit: what [`Unfolded::sums`] are taken by.
+    /// By orbit: the weight in [`Unfolded::sums`].
     pub weight: &'a [f32],
 }
 
@@ -204,22 +212,23 @@ pub struct Basis<'a, E> {
 pub struct Unfolded {
     /// Weighted sums, by channel.
     pub sums: [f32; CHANNELS],
-    /// Largest change of a number, if it was looked for.
+    /// Largest change of a number; 0 without `COMPARE`.
     pub change: f32,
-    /// Largest number, likewise.
+    /// Largest number; 0 without `COMPARE`.
     pub peak: f32,
 }
 
-/// A signal of three channels from its coefficients; negative numbers become zero. With `COMPARE`, looks at what was there
-/// before.
+/// A signal of three channels from its coefficients. Negative numbers become zero. With `COMPARE`, also
+/// compares with the numbers that `signal` held before.
 ///
 /// Sums over modes are taken in the order of the columns, class by class.
 ///
 /// # Panics
-/// If there are not `GROUP` classes, a signal is not `GROUP` times as long as `weight`, that is no multiple of
-/// [`WIDEST`], there are not as many numbers in tiles as modes times orbits, or `x` does not have the coefficients.
+/// If there are not `GROUP` classes, a signal is not `GROUP` times as long as `weight`, the length of
+/// `weight` is not a multiple of [`WIDEST`], the tiles do not have modes times orbits numbers, or `x` lacks
+/// coefficients.
 #[inline(always)]
-pub fn unfold<L: Lanes, E: Element, const GROUP: usize, const COMPARE: bool>(
+pub fn unfold<L: Lanes, E: PackedNumber, const GROUP: usize, const COMPARE: bool>(
     l: L,
     basis: Basis<'_, E>,
     x: Rgb<'_>,
@@ -232,11 +241,11 @@ pub fn unfold<L: Lanes, E: Element, const GROUP: usize, const COMPARE: bool>(
     }
 }
 
-/// `VECTORS` vectors of orbits at a time.
+/// [`unfold`], `VECTORS` vectors of orbits at a time.
 #[inline(always)]
 fn unfold_with<
     L: Lanes,
-    E: Element,
+    E: PackedNumber,
     const GROUP: usize,
     const VECTORS: usize,
     const COMPARE: bool,
@@ -246,46 +255,18 @@ fn unfold_with<
     x: Rgb<'_>,
     signal: &mut [&mut [f32]; CHANNELS],
 ) -> Unfolded {
-    let Basis {
-        tiles,
-        classes,
-        weight,
-    } = basis;
-    let stride = weight.len();
-    assert_eq!(classes.len(), GROUP, "classes");
-    let (mut columns, mut limit) = (0, 0);
-    for class in classes {
-        columns += class.len();
-        limit = limit.max(class.end);
-    }
+    let stride = basis.weight.len();
     assert!(stride.is_multiple_of(WIDEST) && TILE.is_multiple_of(VECTORS * L::N));
-    assert_eq!(tiles.len(), stride * columns, "numbers of a basis");
-    assert!(x.has(limit));
-    for channel in signal.iter() {
-        assert_eq!(channel.len(), GROUP * stride, "numbers of a signal");
-    }
+    let columns = basis.assert_fits::<GROUP>(x, signal);
     let zero = l.splat(0.0);
     let mut totals = [zero; CHANNELS];
     let (mut change, mut peak) = (zero, zero);
     let mut at = 0;
     while at < stride {
-        let mut column = at / TILE * TILE * columns + at % TILE;
-        let mut sums = [[[zero; VECTORS]; CHANNELS]; GROUP];
-        // Written out: a loop over classes would keep the sums in memory.
-        macro_rules! add_class {
-            ($($class:literal)*) => {
-                $(if $class < GROUP {
-                    let modes = classes[$class].clone();
-                    let next = column + modes.len() * TILE;
-                    // SAFETY: columns of all classes lie within the tile that `at` is in, and `x` has numbers up to the
-                    // limit.
-                    sums[$class] = unsafe { sum_class(l, tiles, column, modes, x) };
-                    column = next;
-                })*
-            };
-        }
-        add_class!(0 1 2 3 4 5 6 7);
-        debug_assert_eq!(column, (at / TILE + 1) * TILE * columns + at % TILE);
+        let first = at / TILE * TILE * columns + at % TILE;
+        // SAFETY: the columns of all classes lie within the tile of `at`, and `x` has a number for every
+        // coefficient of a class.
+        let sums = unsafe { sum_classes::<L, E, GROUP, VECTORS>(l, basis, first, x) };
         for channel in 0..CHANNELS {
             let signal = &mut *signal[channel];
             for vector in 0..VECTORS {
@@ -296,7 +277,7 @@ fn unfold_with<
                 }
                 butterflies::<L, GROUP>(l, &mut v);
                 // SAFETY: at + N <= stride.
-                let weight = unsafe { l.load_unchecked(weight, at) };
+                let weight = unsafe { l.load_unchecked(basis.weight, at) };
                 for (element, v) in v.iter().enumerate() {
                     let at = element * stride + at;
                     let now = l.max(*v, zero);
@@ -324,13 +305,69 @@ fn unfold_with<
     Unfolded { sums, change, peak }
 }
 
-/// Columns of one class from number `at` of the tiles on, times the coefficients of its modes.
+impl<E> Basis<'_, E> {
+    /// Checks that there are `GROUP` classes, a column of the tiles for each of their modes, the
+    /// coefficients of all modes in `x`, and `GROUP` parts of a signal. Returns the number of columns.
+    #[inline(always)]
+    fn assert_fits<const GROUP: usize>(
+        &self,
+        x: Rgb<'_>,
+        signal: &[&mut [f32]; CHANNELS],
+    ) -> usize {
+        assert_eq!(self.classes.len(), GROUP, "classes");
+        let (mut columns, mut limit) = (0, 0);
+        for class in self.classes {
+            columns += class.len();
+            limit = limit.max(class.end);
+        }
+        let stride = self.weight.len();
+        assert_eq!(self.tiles.len(), stride * columns, "numbers of a basis");
+        assert!(x.has(limit));
+        for channel in signal {
+            assert_eq!(channel.len(), GROUP * stride, "numbers of a signal");
+        }
+        columns
+    }
+}
+
+/// Columns of each class times the coefficients of its modes. The first column starts at number `first` of
+/// the tiles.
 ///
 /// # Safety
-/// A tile's height lies between `at` and the first number of each next column, the last of them has `VECTORS` vectors,
-/// and `x` has the coefficients.
+/// As [`sum_class`], for the columns of all classes one after another.
 #[inline(always)]
-unsafe fn sum_class<L: Lanes, E: Element, const VECTORS: usize>(
+unsafe fn sum_classes<L: Lanes, E: PackedNumber, const GROUP: usize, const VECTORS: usize>(
+    l: L,
+    basis: Basis<'_, E>,
+    first: usize,
+    x: Rgb<'_>,
+) -> [[[L::V; VECTORS]; CHANNELS]; GROUP] {
+    let mut sums = [[[l.splat(0.0); VECTORS]; CHANNELS]; GROUP];
+    let mut column = first;
+    // Written out: a loop over classes would keep the sums in memory.
+    macro_rules! add_class {
+        ($($class:literal)*) => {
+            $(if $class < GROUP {
+                let modes = basis.classes[$class].clone();
+                let next = column + modes.len() * TILE;
+                // SAFETY: the caller's promises.
+                sums[$class] = unsafe { sum_class(l, basis.tiles, column, modes, x) };
+                column = next;
+            })*
+        };
+    }
+    add_class!(0 1 2 3 4 5 6 7);
+    let _ = column;
+    sums
+}
+
+/// Columns of one class, from number `at` of the tiles on, times the coefficients of its modes.
+///
+/// # Safety
+/// Columns lie [`TILE`] numbers apart. From its first number on, the last column has `VECTORS` vectors.
+/// `x` has the coefficients of all `modes`.
+#[inline(always)]
+unsafe fn sum_class<L: Lanes, E: PackedNumber, const VECTORS: usize>(
     l: L,
     tiles: &[E],
     at: usize,
@@ -343,10 +380,11 @@ unsafe fn sum_class<L: Lanes, E: Element, const VECTORS: usize>(
         let mut a = [l.splat(0.0); VECTORS];
         for (v, a) in a.iter_mut().enumerate() {
             let at = at + v * L::N;
-            // SAFETY: the caller's promises; so below.
+            // SAFETY: the caller's promises.
             *a = E::load(l, unsafe { tiles.get_unchecked(at..at + L::N) });
         }
         for (channel, acc) in acc.iter_mut().enumerate() {
+            // SAFETY: the caller's promises.
             let x = unsafe { *x.values.get_unchecked(channel * x.stride + mode) };
             let x = l.splat(x);
             for (acc, &a) in acc.iter_mut().zip(&a) {

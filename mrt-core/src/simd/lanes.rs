@@ -1,25 +1,26 @@
-//! What every instruction set offers.
+//! The operations that every instruction set offers.
 
 use std::fmt::Debug;
 
-/// Lanes of the widest level: storage padded to a multiple of it needs no remainders.
+/// Lanes of the widest level. Storage that is padded to a multiple of it leaves no remainder at any
+/// level.
 pub const WIDEST: usize = 16;
 
-/// A vector of `f32`, and what can be done with it. Values of these types are proof that the machine has the
+/// Operations on vectors of `f32`. A value of an implementing type proves that the machine has the
 /// instructions.
 ///
-/// Loads and stores take slices of at least [`Lanes::N`] elements and use the first ones.
+/// Loads and stores take slices of at least [`Lanes::N`] elements, and use the first `N` of them.
 #[allow(
     missing_docs,
     reason = "each is the operation on every lane that its name says"
 )]
 pub trait Lanes: Copy + Debug + Send + Sync + 'static {
-    /// `N` numbers.
+    /// A vector of `N` numbers.
     type V: Copy + Debug + Send + Sync;
-    /// The lanes to use for eight rows: these, or the next narrower ones where these are 16.
+    /// The lanes to use for eight rows: the next narrower ones if these are 16, else these.
     type Narrow: Lanes;
 
-    /// Numbers in a vector.
+    /// How many numbers a vector holds.
     const N: usize;
 
     fn narrow(self) -> Self::Narrow;
@@ -46,32 +47,32 @@ pub trait Lanes: Copy + Debug + Send + Sync + 'static {
         // SAFETY: the caller's promise.
         self.store(unsafe { to.get_unchecked_mut(at..at + Self::N) }, v);
     }
-    /// Half-precision numbers, by their bits, as `f32`; infinities and NaN do not occur.
+    /// Loads half-precision numbers, given by their bits, as `f32`. They must be finite.
     fn load_f16(self, from: &[u16]) -> Self::V;
     fn load_i8(self, from: &[i8]) -> Self::V;
     fn add(self, a: Self::V, b: Self::V) -> Self::V;
     fn sub(self, a: Self::V, b: Self::V) -> Self::V;
     fn mul(self, a: Self::V, b: Self::V) -> Self::V;
     fn div(self, a: Self::V, b: Self::V) -> Self::V;
-    /// `a * b + c`, rounded once or twice as the level does.
+    /// `a * b + c`, rounded once or twice, depending on the level.
     fn mul_add(self, a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     fn sqrt(self, a: Self::V) -> Self::V;
-    /// The larger; `b` if one is NaN.
+    /// The larger in each lane; `b` if one is NaN.
     fn max(self, a: Self::V, b: Self::V) -> Self::V;
-    /// The smaller; `b` if one is NaN.
+    /// The smaller in each lane; `b` if one is NaN.
     fn min(self, a: Self::V, b: Self::V) -> Self::V;
     fn abs(self, a: Self::V) -> Self::V;
     /// `x` where `a >= b`, else 0.
     fn keep_where_ge(self, a: Self::V, b: Self::V, x: Self::V) -> Self::V;
     /// Sum of the lanes, in an order that depends on the level alone.
     fn sum(self, a: Self::V) -> f32;
-    /// [`Lanes::sum`] of four vectors, added up in another order.
+    /// The sum of each of four vectors, in an order that may differ from that of [`Lanes::sum`].
     fn sum_four(self, v: [Self::V; 4]) -> [f32; 4];
-    /// The largest lane; no lane is NaN.
+    /// The largest lane. No lane may be NaN.
     fn largest(self, a: Self::V) -> f32;
 }
 
-/// One lane: the reference for all others.
+/// One lane: the reference for all other lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Scalar;
 
@@ -158,11 +159,13 @@ impl Lanes for Scalar {
     }
 }
 
-/// 2^112: the distance between the exponents of half and single precision.
+/// 2^112: the exponent biases of half and single precision differ by 112.
 pub(super) const F16_EXPONENT: f32 = 5.192_297e33;
 
-/// The number of a half's bits. Exponent and mantissa move to their place in an `f32`, whose exponent is then too
-/// small by 112; a product makes up for that, and is exact for subnormal halves too.
+/// The half-precision number with the given bits, which must be finite.
+///
+/// Exponent and mantissa move to their place in an `f32`, whose exponent is then too small by 112. A
+/// product corrects that, exactly for subnormal numbers too.
 #[inline(always)]
 pub fn f32_from_f16_bits(bits: u16) -> f32 {
     let magnitude = f32::from_bits(u32::from(bits & 0x7fff) << 13) * F16_EXPONENT;

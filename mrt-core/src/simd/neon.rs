@@ -1,26 +1,26 @@
-//! NEON.
+//! The lanes of NEON.
 
 #![allow(
     unsafe_code,
     reason = "intrinsics of instructions that every 64-bit ARM has"
 )]
 
-use super::Kernel;
+use super::kernel::Kernel;
 use super::lanes::Lanes;
 use std::arch::aarch64::*;
 use std::arch::asm;
 
-/// Proof of NEON.
+/// Proof that the machine has NEON.
 #[derive(Clone, Copy, Debug)]
 pub struct Neon(());
 
-/// NEON belongs to 64-bit ARM.
+/// Runs a kernel with NEON, which every 64-bit ARM has.
 pub(super) fn run_neon<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Neon(()))
 }
 
-// SAFETY, of every block below: every 64-bit ARM has the instructions, and slices are checked to hold 4 elements before
-// their pointers are read.
+// SAFETY, of every block below: every 64-bit ARM has the instructions, and slices are checked to hold
+// 4 elements before their pointers are read.
 impl Lanes for Neon {
     type V = float32x4_t;
     type Narrow = Neon;
@@ -50,7 +50,7 @@ impl Lanes for Neon {
         unsafe {
             let halves = vld1_u16(from.as_ptr());
             let wide: float32x4_t;
-            // The intrinsic's type is newer than the Rust that this needs; the instruction is not.
+            // The type of the intrinsic needs a newer Rust than this crate; the instruction does not.
             asm!(
                 "fcvtl {wide:v}.4s, {halves:v}.4h",
                 wide = out(vreg) wide,

@@ -1,4 +1,4 @@
-//! Products of few long rows of numbers with three vectors: red, green and blue.
+//! Products of a few long rows of numbers with three vectors: red, green and blue.
 //!
 //! A product keeps a vector of sums for each row and channel. Functions here are parts of kernels, as in
 //! [`tiles`](super::tiles).
@@ -8,21 +8,23 @@
     reason = "bounds are checked once a call, not once a number"
 )]
 
-use super::Lanes;
-use super::tiles::{CHANNELS, Element};
+use super::lanes::Lanes;
+use super::tiles::{CHANNELS, PackedNumber};
 
-/// Rows of a group in [`dot_rows`], at most.
+/// Most rows of one call of [`dot_rows`].
 pub const DOT_ROWS: usize = 4;
 
-/// Sums of `count` rows of numbers times three vectors: `out[channel][row]`, zero for rows that there are not.
+/// Scalar products of `count` rows with three vectors: `out[channel][row]`, which is zero for
+/// `row >= count`.
 ///
-/// `rows` holds row after row, each as long as a vector; lengths are multiples of [`WIDEST`](super::WIDEST).
+/// `rows` holds row after row, each as long as a vector. That length is a multiple of
+/// [`WIDEST`](super::WIDEST).
 ///
 /// # Panics
-/// If `count` is not 1 to [`DOT_ROWS`], `rows` not that many times as long as a vector, or that length no multiple of the
-/// lanes.
+/// If `count` is not 1 to [`DOT_ROWS`], `rows` is not `count` times as long as a vector, or that length is
+/// not a multiple of the lanes.
 #[inline(always)]
-pub fn dot_rows<L: Lanes, E: Element>(
+pub fn dot_rows<L: Lanes, E: PackedNumber>(
     l: L,
     count: usize,
     rows: &[E],
@@ -37,9 +39,9 @@ pub fn dot_rows<L: Lanes, E: Element>(
     }
 }
 
-/// `SETS` vectors of each row go to sums of their own, so that enough products are under way at once.
+/// Every `SETS` vectors of a row add to sums of their own, so that enough products are under way at once.
 #[inline(always)]
-fn dot_some_rows<L: Lanes, E: Element, const ROWS: usize, const SETS: usize>(
+fn dot_some_rows<L: Lanes, E: PackedNumber, const ROWS: usize, const SETS: usize>(
     l: L,
     rows: &[E],
     x: [&[f32]; CHANNELS],
@@ -53,13 +55,13 @@ fn dot_some_rows<L: Lanes, E: Element, const ROWS: usize, const SETS: usize>(
     while at + step <= length {
         for (set, acc) in acc.iter_mut().enumerate() {
             // SAFETY: at + step <= length.
-            unsafe { dot_vector(l, rows, x, length, at + set * L::N, acc) };
+            unsafe { dot_vector(l, rows, x, at + set * L::N, acc) };
         }
         at += step;
     }
     while at < length {
         // SAFETY: at + N <= length, since the length is a multiple of N.
-        unsafe { dot_vector(l, rows, x, length, at, &mut acc[0]) };
+        unsafe { dot_vector(l, rows, x, at, &mut acc[0]) };
         at += L::N;
     }
     let mut sums = [[0.0; DOT_ROWS]; CHANNELS];
@@ -76,13 +78,14 @@ fn dot_some_rows<L: Lanes, E: Element, const ROWS: usize, const SETS: usize>(
     sums
 }
 
-/// [`dot_rows`] of [`DOT_ROWS`] rows, each of which has vectors of its own: row k is multiplied by the three that lie one
-/// after another in `x` from `starts[k]` on.
+/// Scalar products of [`DOT_ROWS`] rows, each with three vectors of its own: `out[channel][row]`. The
+/// vectors of row k lie one after another in `x`, from `starts[k]` on.
 ///
 /// # Panics
-/// If `rows` is not [`DOT_ROWS`] times `length`, that is no multiple of the lanes, or `x` is too short.
+/// If `rows` is not [`DOT_ROWS`] times `length` long, `length` is not a multiple of the lanes, or `x` is
+/// too short.
 #[inline(always)]
-pub fn dot_unlike_rows<L: Lanes, E: Element>(
+pub fn dot_unlike_rows<L: Lanes, E: PackedNumber>(
     l: L,
     rows: &[E],
     x: &[f32],
@@ -90,9 +93,16 @@ pub fn dot_unlike_rows<L: Lanes, E: Element>(
     length: usize,
 ) -> [[f32; DOT_ROWS]; CHANNELS] {
     assert!(length.is_multiple_of(L::N));
-    assert_eq!(rows.len(), DOT_ROWS * length, "rows");
+    // Divided and saturating, so that no length or start can wrap around.
+    assert!(
+        rows.len() / DOT_ROWS == length && rows.len().is_multiple_of(DOT_ROWS),
+        "rows"
+    );
     for start in starts {
-        assert!(start + CHANNELS * length <= x.len(), "vectors");
+        assert!(
+            start.saturating_add(CHANNELS * length) <= x.len(),
+            "vectors"
+        );
     }
     let mut acc = [[l.splat(0.0); DOT_ROWS]; CHANNELS];
     let mut at = 0;
@@ -120,23 +130,25 @@ pub fn dot_unlike_rows<L: Lanes, E: Element>(
 /// `acc += rows[at..] * x[at..]`, one vector of each row.
 ///
 /// # Safety
-/// Each vector of `x` has `length` numbers, `rows` that many for each row, and `at + N <= length`.
+/// All vectors of `x` have one length, `rows` holds `ROWS` rows of that length, and `at + N` is at most
+/// that length.
 #[inline(always)]
-unsafe fn dot_vector<L: Lanes, E: Element, const ROWS: usize>(
+unsafe fn dot_vector<L: Lanes, E: PackedNumber, const ROWS: usize>(
     l: L,
     rows: &[E],
     x: [&[f32]; CHANNELS],
-    length: usize,
     at: usize,
     acc: &mut [[L::V; CHANNELS]; ROWS],
 ) {
+    let length = x[0].len();
     let mut signal = [l.splat(0.0); CHANNELS];
     for (signal, x) in signal.iter_mut().zip(x) {
-        // SAFETY: the caller's promises; so below.
+        // SAFETY: the caller's promises.
         *signal = unsafe { l.load_unchecked(x, at) };
     }
     for (row, acc) in acc.iter_mut().enumerate() {
         let start = row * length + at;
+        // SAFETY: the caller's promises.
         let a = E::load(l, unsafe { rows.get_unchecked(start..start + L::N) });
         for (acc, &signal) in acc.iter_mut().zip(&signal) {
             *acc = l.mul_add(a, signal, *acc);

@@ -1,6 +1,8 @@
+//! Every level against the scalar reference, and the reference against sums in `f64`.
+
 use super::*;
 
-/// Every operation on 16 numbers, results one after another.
+/// Every operation on 16 numbers; the results one after another.
 struct Everything<'a> {
     a: &'a [f32; 16],
     b: &'a [f32; 16],
@@ -38,7 +40,7 @@ impl Kernel for Everything<'_> {
     }
 }
 
-/// Sums and largest of each vector of 16 numbers.
+/// Sums and the largest of 16 numbers, vector by vector.
 struct Reductions<'a>(&'a [f32; 16]);
 
 impl Kernel for Reductions<'_> {
@@ -61,7 +63,7 @@ impl Kernel for Reductions<'_> {
 }
 
 #[test]
-fn every_operation_of_every_level_is_that_of_the_reference() {
+fn operations_of_every_level_agree_with_the_reference() {
     let a = std::array::from_fn(|k| 0.37 * k as f32 - 2.5);
     let b = std::array::from_fn(|k| 1.9 - 0.21 * (k * k) as f32);
     let halves = std::array::from_fn(|k| half::f16::from_f32(a[k] * 1e-4).to_bits());
@@ -76,7 +78,7 @@ fn every_operation_of_every_level_is_that_of_the_reference() {
     for level in SimdLevel::available() {
         let found = level.run(everything());
         for (k, (x, y)) in expected.iter().zip(&found).enumerate() {
-            // One rounding less where products and sums are fused; all else is rounded correctly everywhere.
+            // A fused product and sum has one rounding less. All other operations round correctly.
             let slack = if k / 16 == 7 { 1e-6 } else { 0.0 };
             assert!(
                 (x - y).abs() <= slack * (1.0 + x.abs()),
@@ -96,7 +98,7 @@ fn every_operation_of_every_level_is_that_of_the_reference() {
 }
 
 #[test]
-fn all_halves_that_are_numbers_decode() {
+fn every_finite_half_precision_number_decodes() {
     for bits in 0..=u16::MAX {
         let expected = half::f16::from_bits(bits);
         if expected.is_finite() {
@@ -109,7 +111,7 @@ fn all_halves_that_are_numbers_decode() {
 }
 
 #[test]
-fn what_is_detected_runs_and_caps_hold() {
+fn detected_levels_are_available_and_within_their_cap() {
     assert!(SimdLevel::detect().is_available());
     assert_eq!(SimdLevel::capped(SimdLevel::Scalar), SimdLevel::Scalar);
     for cap in SimdLevel::ALL {
@@ -123,7 +125,7 @@ fn out(sums: &mut [[f32; tiles::TILE]; 3]) -> tiles::TileOut<'_> {
     sums.each_mut().map(|sums| &mut sums[..])
 }
 
-/// A tile or half tile times three vectors.
+/// A tile or half tile times three vectors. Every sum must be overwritten, so the 0.5 never shows.
 struct Tile<'a, E> {
     panel: &'a [E],
     columns: tiles::Columns<'a>,
@@ -132,7 +134,7 @@ struct Tile<'a, E> {
     finish: Option<tiles::Finish<'a>>,
 }
 
-impl<E: tiles::Element> Kernel for Tile<'_, E> {
+impl<E: tiles::PackedNumber> Kernel for Tile<'_, E> {
     type Output = [[f32; tiles::TILE]; 3];
     #[inline(always)]
     fn run<L: Lanes>(self, l: L) -> [[f32; tiles::TILE]; 3] {
@@ -154,6 +156,7 @@ impl<E: tiles::Element> Kernel for Tile<'_, E> {
     }
 }
 
+/// Rows times three vectors.
 struct Dot<'a> {
     rows: &'a [f32],
     x: [&'a [f32]; 3],
@@ -167,7 +170,7 @@ impl Kernel for Dot<'_> {
     }
 }
 
-/// Numbers in [-1, 1), the same everywhere.
+/// Fixed numbers in [-1, 1).
 fn numbers(count: usize) -> Vec<f32> {
     (0..count)
         .map(|k| ((k * 7919 + 13) % 2048) as f32 / 1024.0 - 1.0)
@@ -175,7 +178,7 @@ fn numbers(count: usize) -> Vec<f32> {
 }
 
 #[test]
-fn tiles_are_products_at_every_level_for_every_number_of_columns() {
+fn tiles_are_products_at_every_level_for_any_number_of_columns() {
     for count in 0..11 {
         let columns: Vec<u32> = (0..count).map(|k| (k * 5 % 12) as u32).collect();
         let mut lists = tiles::ColumnLists::default();
@@ -204,7 +207,7 @@ fn tiles_are_products_at_every_level_for_every_number_of_columns() {
                 };
                 let (found, finished) = (run(None), run(Some(finish)));
                 for channel in 0..3 {
-                    // Rows beyond a half tile are nobody's.
+                    // A half tile does not write the rows beyond its own.
                     for row in 0..rows {
                         let product = |(k, &column): (usize, &u32)| {
                             let x = x[channel * 12 + column as usize];
@@ -226,7 +229,7 @@ fn tiles_are_products_at_every_level_for_every_number_of_columns() {
 }
 
 #[test]
-fn dot_products_are_those_of_the_reference() {
+fn dot_products_of_every_level_agree_with_sums_in_f64() {
     let (all, x) = (numbers(4 * 80), numbers(3 * 80));
     let x = std::array::from_fn(|c| &x[c * 80..(c + 1) * 80]);
     let cases = (1..=4).flat_map(|count| SimdLevel::available().map(move |level| (count, level)));
@@ -237,13 +240,14 @@ fn dot_products_are_those_of_the_reference() {
             for (row, &found) in found.iter().enumerate() {
                 let products = rows.get(row * 80..).into_iter().flatten().zip(x[channel]);
                 let sum: f64 = products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-                // Eighty numbers of size 1, in f32; nothing for rows that there are not.
+                // Eighty numbers of size 1 in `f32`. Rows beyond `count` give zero.
                 assert!((f64::from(found) - sum).abs() < 2e-5, "{level:?}");
             }
         }
     }
 }
 
+/// Rows with vectors of their own.
 struct Unlike<'a> {
     rows: &'a [f32],
     x: &'a [f32],
@@ -259,7 +263,7 @@ impl Kernel for Unlike<'_> {
 }
 
 #[test]
-fn rows_with_vectors_of_their_own_are_those_of_the_reference() {
+fn rows_with_vectors_of_their_own_agree_with_sums_in_f64() {
     let (rows, x) = (numbers(4 * 80), numbers(6 * 80));
     let starts = [240, 0, 16, 240];
     for level in SimdLevel::available() {
@@ -273,7 +277,7 @@ fn rows_with_vectors_of_their_own_are_those_of_the_reference() {
                 let x = &x[starts[row] + channel * 80..];
                 let products = rows[row * 80..(row + 1) * 80].iter().zip(x);
                 let sum: f64 = products.map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-                // As above.
+                // Eighty numbers of size 1 in `f32`.
                 assert!((f64::from(found) - sum).abs() < 2e-5, "{level:?}");
             }
         }

@@ -1,51 +1,53 @@
 //! Products of small matrices with three right-hand sides: red, green and blue.
 //!
-//! A matrix is packed in **tiles** of [`TILE`] rows (or half as many), column after column, and a product keeps a tile's
-//! sums in registers while it runs through the columns. Where there are few rows, [`rows`](super::rows) is faster.
+//! A matrix is packed in **tiles** of [`TILE`] rows (or half as many), column after column. A product
+//! keeps the sums of a tile in registers while it runs through the columns. For few rows,
+//! [`rows`](super::rows) is faster.
 //!
-//! Functions here are parts of kernels: inlined into them, they get the instructions of their lanes.
+//! Functions here are parts of kernels: they are inlined into a kernel and so get the instructions of
+//! its lanes.
 
 #![allow(
     unsafe_code,
     reason = "bounds are checked once a call, not once a number"
 )]
 
-use super::Lanes;
+use super::lanes::Lanes;
 use std::ops::Range;
 
-/// Rows of a tile.
+/// Number of rows of a tile.
 pub const TILE: usize = 16;
 
-/// Rows of a half tile, for what would leave more than half of a tile empty.
+/// Number of rows of a half tile, for rows that would leave more than half of a tile empty.
 pub const HALF_TILE: usize = 8;
 
-/// Channels of every right-hand side.
+/// Number of channels of every right-hand side.
 pub const CHANNELS: usize = 3;
 
-/// A number as operators are stored.
-pub trait Element: Copy + Send + Sync + 'static {
-    /// Whether columns may have scales.
+/// A type of number that packed operators consist of: `f32`, half precision by its bits (`u16`), or `i8`.
+pub trait PackedNumber: Copy + Send + Sync + 'static {
+    /// True if columns may have scales.
     const SCALED: bool = false;
-    /// Loads `L::N` of them as `f32`, without scale.
+    /// Loads `L::N` numbers as `f32`, without scale.
     fn load<L: Lanes>(lanes: L, from: &[Self]) -> L::V;
 }
 
-impl Element for f32 {
+impl PackedNumber for f32 {
     #[inline(always)]
     fn load<L: Lanes>(lanes: L, from: &[f32]) -> L::V {
         lanes.load(from)
     }
 }
 
-/// Half-precision numbers by their bits.
-impl Element for u16 {
+/// Half-precision numbers, by their bits.
+impl PackedNumber for u16 {
     #[inline(always)]
     fn load<L: Lanes>(lanes: L, from: &[u16]) -> L::V {
         lanes.load_f16(from)
     }
 }
 
-impl Element for i8 {
+impl PackedNumber for i8 {
     const SCALED: bool = true;
 
     #[inline(always)]
@@ -54,7 +56,8 @@ impl Element for i8 {
     }
 }
 
-/// Right-hand sides: number k of the channels is `values[k]`, `values[k + stride]` and `values[k + 2 stride]`.
+/// Right-hand sides in three channels. Number k of red, green and blue is `values[k]`,
+/// `values[k + stride]` and `values[k + 2 * stride]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Rgb<'a> {
     pub(super) values: &'a [f32],
@@ -62,18 +65,19 @@ pub struct Rgb<'a> {
 }
 
 impl<'a> Rgb<'a> {
-    /// Vectors of `stride` numbers, red, green and blue; more of such triples may follow.
+    /// Three vectors of `stride` numbers one after another: red, green and blue. More such triples may
+    /// follow, and are reached by indices of `3 * stride` and above.
     ///
     /// # Panics
     /// If `stride` is larger than the number of values.
     #[inline(always)]
     pub fn new(values: &'a [f32], stride: usize) -> Self {
-        // So that multiples of it do not wrap around.
+        // So that multiples of the stride do not wrap around.
         assert!(stride <= values.len(), "stride");
         Self { values, stride }
     }
 
-    /// Whether every index below `limit` has its three numbers.
+    /// True if every index below `limit` has its three numbers.
     #[inline(always)]
     pub(super) fn has(&self, limit: usize) -> bool {
         let before_last = (CHANNELS - 1) * self.stride;
@@ -81,15 +85,15 @@ impl<'a> Rgb<'a> {
     }
 }
 
-/// Lists of columns that panels hold; all are checked once, when they are added.
+/// Lists of the columns that panels have. Indices are checked once, when a list is added.
 #[derive(Clone, Debug, Default)]
 pub struct ColumnLists {
     indices: Vec<u32>,
-    /// Above every index.
+    /// Larger than every index.
     limit: usize,
 }
 
-/// One of [`ColumnLists`].
+/// A list of [`ColumnLists`].
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<'a> {
     indices: &'a [u32],
@@ -97,7 +101,7 @@ pub struct Columns<'a> {
 }
 
 impl ColumnLists {
-    /// Adds a list; [`ColumnLists::get`] takes the range that it returns.
+    /// Adds a list, and returns the range by which [`ColumnLists::get`] finds it.
     pub fn push(&mut self, columns: impl IntoIterator<Item = u32>) -> Range<usize> {
         let start = self.indices.len();
         self.indices.extend(columns);
@@ -108,7 +112,10 @@ impl ColumnLists {
         start..self.indices.len()
     }
 
-    /// The indices in a range.
+    /// The list in a range.
+    ///
+    /// # Panics
+    /// If the range ends beyond [`ColumnLists::len`].
     #[inline(always)]
     pub fn get(&self, range: Range<usize>) -> Columns<'_> {
         Columns {
@@ -122,7 +129,7 @@ impl ColumnLists {
         self.indices.len()
     }
 
-    /// True if there are none.
+    /// True if no list has an index.
     pub fn is_empty(&self) -> bool {
         self.indices.is_empty()
     }
@@ -134,16 +141,16 @@ impl ColumnLists {
 }
 
 impl Columns<'_> {
-    /// Their indices.
+    /// Which numbers of a right-hand side the columns belong to.
     pub fn indices(&self) -> &[u32] {
         self.indices
     }
 }
 
-/// Where the sums of a tile go: for each channel at least as many numbers as the tile has rows.
+/// Where the sums of a tile go: by channel, at least as many numbers as the tile has rows.
 pub type TileOut<'a> = [&'a mut [f32]; CHANNELS];
 
-/// A panel of a tile's columns, and what they are multiplied by.
+/// A panel of a tile's columns, and the vectors that it is multiplied by.
 #[derive(Clone, Copy, Debug)]
 pub struct Term<'a, E> {
     /// Numbers of the tile, column after column.
@@ -152,23 +159,35 @@ pub struct Term<'a, E> {
     pub columns: Columns<'a>,
     /// The right-hand sides.
     pub x: Rgb<'a>,
-    /// For `int8` one a column, or empty: what each column is multiplied by. Other numbers have none.
+    /// For `i8`: empty, or one factor for each column. Ignored for other numbers.
     pub scales: &'a [f32],
 }
 
-/// What is made of the sums of a tile or half tile before they are written: `sums * scale * factors + own`.
+impl<E: Copy> Term<'_, E> {
+    /// Checks that the panel has `rows` numbers for each column, and `x` a number for it.
+    #[inline(always)]
+    fn assert_fits(&self, rows: usize) {
+        let count = self.columns.indices.len();
+        assert!(self.x.has(self.columns.limit));
+        assert!(self.scales.is_empty() || self.scales.len() >= count);
+        assert!(self.panel.len() >= count * rows);
+    }
+}
+
+/// How the sums of a tile or half tile are finished before they are written:
+/// `sums * scale * factors + own`.
 #[derive(Clone, Copy, Debug)]
 pub struct Finish<'a> {
-    /// For all rows.
+    /// Factor of all rows.
     pub scale: f32,
-    /// By row.
+    /// Factors by row.
     pub factors: &'a [f32],
-    /// By channel, in that by row.
+    /// Numbers to add, by channel and row.
     pub own: [&'a [f32]; CHANNELS],
 }
 
 impl Finish<'_> {
-    /// Of one vector of rows.
+    /// Finishes one vector of rows.
     #[inline(always)]
     fn apply<L: Lanes>(&self, l: L, channel: usize, row: usize, sum: L::V) -> L::V {
         let factor = l.mul(l.splat(self.scale), l.load(&self.factors[row..]));
@@ -176,13 +195,13 @@ impl Finish<'_> {
     }
 }
 
-/// `sums = panel * x[columns]` over all terms, for a tile of [`TILE`] rows.
+/// `sums = panel * x[columns]`, added up over all terms, for a tile of [`TILE`] rows.
 ///
 /// # Panics
-/// If a panel does not have a tile of numbers for each column, `x` is shorter than any of the lists of columns allows,
-/// or anything in `finish` has fewer rows than the tile.
+/// If a panel has less than a tile of numbers for each column, `x` is shorter than the lists of columns
+/// ask for, or anything in `finish` has fewer rows than the tile.
 #[inline(always)]
-pub fn sum_tile<'a, L: Lanes, E: Element>(
+pub fn sum_tile<'a, L: Lanes, E: PackedNumber>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Option<Finish<'_>>,
@@ -201,7 +220,7 @@ pub fn sum_tile<'a, L: Lanes, E: Element>(
 /// # Panics
 /// As [`sum_tile`].
 #[inline(always)]
-pub fn sum_half_tile<'a, L: Lanes, E: Element>(
+pub fn sum_half_tile<'a, L: Lanes, E: PackedNumber>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Option<Finish<'_>>,
@@ -215,13 +234,13 @@ pub fn sum_half_tile<'a, L: Lanes, E: Element>(
     }
 }
 
-/// `VECTORS` vectors make the `ROWS` of a panel; `SETS` columns go to sums of their own, so that enough
-/// products are under way at once to hide the time that each takes.
+/// `VECTORS` vectors hold the `ROWS` rows of a panel. Every `SETS` columns add to sums of their own, so
+/// that enough products are under way at once to hide the latency of each.
 #[inline(always)]
 fn sum_rows<
     'a,
     L: Lanes,
-    E: Element,
+    E: PackedNumber,
     const VECTORS: usize,
     const SETS: usize,
     const ROWS: usize,
@@ -233,25 +252,17 @@ fn sum_rows<
 ) {
     assert_eq!(VECTORS * L::N, ROWS);
     let mut acc = [[[l.splat(0.0); VECTORS]; CHANNELS]; SETS];
-    for Term {
-        panel,
-        columns,
-        x,
-        scales,
-    } in terms
-    {
-        let count = columns.indices.len();
-        assert!(x.has(columns.limit));
-        assert!(scales.is_empty() || scales.len() >= count);
-        assert!(panel.len() >= count * ROWS);
+    for term in terms {
+        let count = term.columns.indices.len();
+        term.assert_fits(ROWS);
         let whole = count / SETS * SETS;
         let mut k = 0;
-        if E::SCALED && !scales.is_empty() {
+        if E::SCALED && !term.scales.is_empty() {
             while k < count {
                 // SAFETY: k < count, and all else was checked above.
                 unsafe {
-                    let scale = *scales.get_unchecked(k);
-                    add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k, x, scale, &mut acc[0]);
+                    let scale = *term.scales.get_unchecked(k);
+                    add_column::<L, E, VECTORS, ROWS>(l, term, k, scale, &mut acc[0]);
                 }
                 k += 1;
             }
@@ -259,17 +270,13 @@ fn sum_rows<
         while k < whole {
             for (set, acc) in acc.iter_mut().enumerate() {
                 // SAFETY: k + set < count, and all else was checked above.
-                unsafe {
-                    add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k + set, x, 1.0, acc);
-                }
+                unsafe { add_column::<L, E, VECTORS, ROWS>(l, term, k + set, 1.0, acc) };
             }
             k += SETS;
         }
         while k < count {
-            // SAFETY: as above.
-            unsafe {
-                add_column::<L, E, VECTORS, ROWS>(l, panel, columns, k, x, 1.0, &mut acc[0]);
-            }
+            // SAFETY: k < count, and all else was checked above.
+            unsafe { add_column::<L, E, VECTORS, ROWS>(l, term, k, 1.0, &mut acc[0]) };
             k += 1;
         }
     }
@@ -289,24 +296,23 @@ fn sum_rows<
     }
 }
 
-/// `acc += panel[k] * scale * x[columns[k]]`, the scale for `int8` only.
+/// `acc += panel[k] * scale * x[columns[k]]`; numbers that have no scales ignore it.
 ///
 /// # Safety
-/// `k` is below the number of columns, the panel has `ROWS` numbers for each of them, `VECTORS` vectors make `ROWS`, and
-/// `x` has three numbers for every index below the columns' limit.
+/// `k` is below the number of columns, the panel has `ROWS` numbers for each of them, `VECTORS` vectors
+/// hold `ROWS` numbers, and `x` has three numbers for every index below the columns' limit.
 #[inline(always)]
-unsafe fn add_column<L: Lanes, E: Element, const VECTORS: usize, const ROWS: usize>(
+unsafe fn add_column<L: Lanes, E: PackedNumber, const VECTORS: usize, const ROWS: usize>(
     l: L,
-    panel: &[E],
-    columns: Columns<'_>,
+    term: Term<'_, E>,
     k: usize,
-    x: Rgb<'_>,
     scale: f32,
     acc: &mut [[L::V; VECTORS]; CHANNELS],
 ) {
+    let x = term.x;
     // SAFETY: the caller's promises.
     let (red, green, blue) = unsafe {
-        let column = *columns.indices.get_unchecked(k) as usize;
+        let column = *term.columns.indices.get_unchecked(k) as usize;
         let at = |channel: usize| *x.values.get_unchecked(channel * x.stride + column);
         (at(0), at(1), at(2))
     };
@@ -319,9 +325,10 @@ unsafe fn add_column<L: Lanes, E: Element, const VECTORS: usize, const ROWS: usi
     for (v, a) in a.iter_mut().enumerate() {
         let at = k * ROWS + v * L::N;
         // SAFETY: the caller's promises.
-        *a = E::load(l, unsafe { panel.get_unchecked(at..at + L::N) });
+        *a = E::load(l, unsafe { term.panel.get_unchecked(at..at + L::N) });
     }
-    // One channel after another: eight lanes have registers for one of `x` besides two sets of sums.
+    // One channel after another: with eight lanes, only one number of `x` fits in the registers beside
+    // two sets of sums.
     for channel in 0..CHANNELS {
         let x = l.splat(x[channel]);
         for v in 0..VECTORS {
@@ -332,7 +339,7 @@ unsafe fn add_column<L: Lanes, E: Element, const VECTORS: usize, const ROWS: usi
 
 /// The reference: each sum in the order of the columns.
 #[inline(always)]
-fn sum_rows_one_by_one<'a, L: Lanes, E: Element, const ROWS: usize>(
+fn sum_rows_one_by_one<'a, L: Lanes, E: PackedNumber, const ROWS: usize>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Option<Finish<'_>>,

@@ -1,28 +1,28 @@
-//! SSE2, AVX2 and AVX-512.
+//! The lanes of SSE2, AVX2 and AVX-512.
 
 #![allow(
     unsafe_code,
     reason = "intrinsics; the types below are made only where the machine has their instructions"
 )]
 
-use super::Kernel;
+use super::kernel::Kernel;
 use super::lanes::{F16_EXPONENT, Lanes};
 use std::arch::x86_64::*;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Proof of SSE2.
+/// Proof that the machine has SSE2.
 #[derive(Clone, Copy, Debug)]
 pub struct Sse2(());
 
-/// Proof of AVX2, FMA and F16C.
+/// Proof that the machine has AVX2, FMA and F16C.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx2(());
 
-/// Proof of AVX-512 F and VL, and of what [`Avx2`] proves.
+/// Proof that the machine has AVX-512 F and VL, and all that [`Avx2`] proves.
 #[derive(Clone, Copy, Debug)]
 pub struct Avx512(());
 
-/// What the machine has: asked once, since kernels are many and short.
+/// What the machine has. It is asked once, because kernels are many and short.
 static FOUND: AtomicU8 = AtomicU8::new(UNKNOWN);
 const UNKNOWN: u8 = 0;
 const BASELINE: u8 = 1;
@@ -62,36 +62,42 @@ pub(super) fn has_avx512() -> bool {
     found() == AVX512
 }
 
-/// SSE2 belongs to x86-64.
+/// Runs a kernel with SSE2, which every x86-64 has.
 pub(super) fn run_sse2<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Sse2(()))
 }
 
-/// Call only where [`has_avx2`].
+/// Runs a kernel with AVX2.
+///
+/// # Panics
+/// If the machine lacks it: call only where [`has_avx2`].
 pub(super) fn run_avx2<K: Kernel>(kernel: K) -> K::Output {
     #[target_feature(enable = "avx2,fma,f16c")]
     fn run<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx2(()))
     }
     assert!(has_avx2());
-    // SAFETY: the machine has the instructions, as was just asked.
+    // SAFETY: the machine has the instructions, as was just asserted.
     unsafe { run(kernel) }
 }
 
-/// Call only where [`has_avx512`].
+/// Runs a kernel with AVX-512.
+///
+/// # Panics
+/// If the machine lacks it: call only where [`has_avx512`].
 pub(super) fn run_avx512<K: Kernel>(kernel: K) -> K::Output {
-    // With VL, kernels of eight lanes have all 32 registers too.
+    // With VL, kernels of eight lanes can use all 32 registers too.
     #[target_feature(enable = "avx512f,avx512vl,avx2,fma,f16c")]
     fn run<K: Kernel>(kernel: K) -> K::Output {
         kernel.run(Avx512(()))
     }
     assert!(has_avx512());
-    // SAFETY: as above.
+    // SAFETY: the machine has the instructions, as was just asserted.
     unsafe { run(kernel) }
 }
 
-// SAFETY, of every block below: a value of `Sse2` exists only where the machine has the instructions, and slices
-// are checked to hold 4 elements before their pointers are read.
+// SAFETY, of every block below: a value of `Sse2` exists only where the machine has the instructions, and
+// slices are checked to hold 4 elements before their pointers are read.
 impl Lanes for Sse2 {
     type V = __m128;
     type Narrow = Sse2;
@@ -162,7 +168,7 @@ impl Lanes for Sse2 {
         let bits = i32::from_le_bytes([from[0] as u8, from[1] as u8, from[2] as u8, from[3] as u8]);
         unsafe {
             let bytes = _mm_cvtsi32_si128(bits);
-            // Each byte to the top of a 32-bit lane, then down with its sign.
+            // Each byte moves to the top of a 32-bit lane, then down with its sign.
             let words = _mm_unpacklo_epi8(_mm_setzero_si128(), bytes);
             let wide = _mm_unpacklo_epi16(_mm_setzero_si128(), words);
             _mm_cvtepi32_ps(_mm_srai_epi32::<24>(wide))
@@ -192,7 +198,7 @@ impl Lanes for Sse2 {
     fn sum_four(self, [a, b, c, d]: [__m128; 4]) -> [f32; 4] {
         let mut sums = [0.0; 4];
         unsafe {
-            // Lanes 0 + 2 and 1 + 3 of a and b, of c and d.
+            // The sums of lanes 0 and 2 and of lanes 1 and 3, for a and b and for c and d.
             let ab = _mm_add_ps(_mm_unpacklo_ps(a, b), _mm_unpackhi_ps(a, b));
             let cd = _mm_add_ps(_mm_unpacklo_ps(c, d), _mm_unpackhi_ps(c, d));
             let all = _mm_add_ps(_mm_movelh_ps(ab, cd), _mm_movehl_ps(cd, ab));
@@ -210,8 +216,8 @@ impl Lanes for Sse2 {
     }
 }
 
-// SAFETY, of every block below: a value of `Avx2` exists only where the machine has the instructions, and slices
-// are checked to hold 8 elements before their pointers are read.
+// SAFETY, of every block below: a value of `Avx2` exists only where the machine has the instructions, and
+// slices are checked to hold 8 elements before their pointers are read.
 impl Lanes for Avx2 {
     type V = __m256;
     type Narrow = Avx2;
@@ -299,7 +305,7 @@ impl Lanes for Avx2 {
     fn sum_four(self, [a, b, c, d]: [__m256; 4]) -> [f32; 4] {
         let mut sums = [0.0; 4];
         unsafe {
-            // As with four lanes, in both halves at once.
+            // As for four lanes, in both halves at once.
             let ab = _mm256_add_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b));
             let cd = _mm256_add_ps(_mm256_unpacklo_ps(c, d), _mm256_unpackhi_ps(c, d));
             let all = _mm256_add_ps(
@@ -320,8 +326,8 @@ impl Lanes for Avx2 {
     }
 }
 
-// SAFETY, of every block below: a value of `Avx512` exists only where the machine has the instructions, and slices
-// are checked to hold 16 elements before their pointers are read.
+// SAFETY, of every block below: a value of `Avx512` exists only where the machine has the instructions, and
+// slices are checked to hold 16 elements before their pointers are read.
 impl Lanes for Avx512 {
     type V = __m512;
     type Narrow = Avx2;
@@ -410,7 +416,7 @@ impl Lanes for Avx512 {
     fn sum_four(self, [a, b, c, d]: [__m512; 4]) -> [f32; 4] {
         let mut sums = [0.0; 4];
         unsafe {
-            // As with four lanes, in all quarters at once.
+            // As for four lanes, in all quarters at once.
             let ab = _mm512_add_ps(_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b));
             let cd = _mm512_add_ps(_mm512_unpacklo_ps(c, d), _mm512_unpackhi_ps(c, d));
             let all = _mm512_add_ps(

@@ -12,7 +12,7 @@ const F16_TOP_EXPONENT: i32 = 14;
 const F16_LARGEST_SCALE_EXPONENT: i32 = 112;
 
 impl StoredMatrix<'static> {
-    /// Rounds a matrix to `storage`, with a scale a mode unless that is `f32`.
+    /// Rounds a matrix to `storage`, with one scale per mode unless that is `f32`.
     ///
     /// `f16` divides by a power of two, exactly, and rounds to nearest, ties to even, so the error
     /// does not depend on the magnitude of a mode. `int8` rounds to multiples of 1/127 of the mode's

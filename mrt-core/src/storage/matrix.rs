@@ -10,14 +10,14 @@ use std::borrow::Cow;
 pub enum Storage {
     /// IEEE single precision, without a scale.
     F32,
-    /// IEEE half precision times a power of two a mode.
+    /// IEEE half precision times one power of two per mode.
     F16,
-    /// Integers from -127 to 127 times a scale a mode.
+    /// Integers from -127 to 127 times one scale per mode.
     Int8,
 }
 
 impl Storage {
-    /// All of them, most exact first.
+    /// All storages, most exact first.
     pub const ALL: [Storage; 3] = [Storage::F32, Storage::F16, Storage::Int8];
 
     /// "f32", "f16" or "int8".
@@ -87,7 +87,7 @@ pub struct StoredMatrix<'a> {
     pub(super) columns: usize,
     pub(super) modes: ModeAxis,
     pub(super) values: CowValues<'a>,
-    /// One scale a mode: finite, normal, positive, and for `f16` a power of two. Empty for `f32`.
+    /// One scale per mode: finite, normal, positive, and for `f16` a power of two. Empty for `f32`.
     pub(super) scales: Cow<'a, [f32]>,
 }
 
@@ -168,7 +168,7 @@ impl<'a> StoredMatrix<'a> {
             CowValues::Int8(values) => StoredValues::Int8(values),
         }
     }
-    /// What the values of each mode are multiplied by: one scale a mode, or none for `f32`.
+    /// What the values of each mode are multiplied by: one scale per mode, or none for `f32`.
     pub fn scales(&self) -> &[f32] {
         &self.scales
     }

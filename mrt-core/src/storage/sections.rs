@@ -1,7 +1,7 @@
 //! Stored matrices as sections of a container.
 //!
 //! The values are one section, whose element type (F32, F16 or I8) tells how they are stored. The
-//! scales, if there are any, are an F32 section of their own, one number a mode. The caller names both
+//! scales, if there are any, are an F32 section of their own, one number per mode. The caller names both
 //! sections: names have eight bytes, so no suffix would always fit. A format that starts to use F16 or
 //! I8 needs a new content version, because older readers know neither.
 
@@ -53,7 +53,7 @@ pub fn write_stored(
 /// - [`ContainerError::LimitExceeded`], if `budget` has fewer bytes left than must be copied.
 /// - [`ContainerError::Malformed`] for values that have another type than F32, F16 or I8, or are not
 ///   rows x columns in number, and for a value that is infinite, NaN or the integer -128.
-/// - [`ContainerError::Malformed`] for scales that are not one a mode, and for a scale that is not a
+/// - [`ContainerError::Malformed`] for scales that are not one per mode, and for a scale that is not a
 ///   normal positive number (for F16 a power of two) whose product with the largest value of the type
 ///   is finite.
 pub fn read_stored<'a>(

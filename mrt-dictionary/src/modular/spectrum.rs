@@ -1,9 +1,10 @@
 //! How fast singular values fall: the paper's table 2, on the closed cube.
 
 use crate::config::PriorConfig;
-use crate::modular::light_prior::cube::{direct_samples, light_prior};
+use crate::modular::light_prior::basis::light_prior;
+use crate::modular::light_prior::cube::direct_samples;
 use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
-use crate::modular::surface::mirrors::texel_parity_classes;
+use crate::modular::surface::mirrors::cube::texel_parity_classes;
 use crate::modular::transport::modes::{block_transport, fold_bounce};
 use crate::progress::{Cancelled, Progress};
 use mrt_core::linalg::matrix::Matrix;
@@ -17,11 +18,11 @@ const TABLE_PRIOR_VECTORS: usize = 64;
 /// Singular values of one matrix.
 #[derive(Clone, Debug)]
 pub struct Spectrum {
-    /// Which matrix.
+    /// Name of the matrix.
     pub matrix: &'static str,
     /// Rows and columns.
     pub size: [usize; 2],
-    /// Largest first.
+    /// Singular values, largest first.
     pub singular_values: Vec<f64>,
 }
 
@@ -36,7 +37,7 @@ impl Spectrum {
 /// M = F P S with 64 prior vectors, without enrichment.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`], if the caller has asked to stop.
 pub fn closed_cube_spectra(
     resolution: usize,
     progress: &Progress,
@@ -96,8 +97,8 @@ pub fn closed_cube_spectra(
 mod tests {
     use super::*;
 
-    /// Counts for 80, 90 and 95 % that an independent `f64` computation gave, and how far off each
-    /// may be: implementations of the texel quadrature differ by that much.
+    /// Counts for 80, 90 and 95 % from an independent `f64` computation, and the largest accepted difference:
+    /// implementations of the texel quadrature differ by that much.
     const EXPECTED: [([usize; 3], usize); 4] = [
         ([205, 288, 346], 2),
         ([160, 234, 306], 3),
@@ -106,7 +107,7 @@ mod tests {
     ];
 
     #[test]
-    fn counts_match_table_2() {
+    fn counts_are_those_of_the_papers_table_2() {
         let spectra = closed_cube_spectra(16, &Progress::silent()).expect("nobody cancels");
         for (spectrum, (expected, slack)) in spectra.iter().zip(EXPECTED) {
             for (fraction, count) in [0.80, 0.90, 0.95].into_iter().zip(expected) {

@@ -1,4 +1,8 @@
-//! Mirrors of a shape and of its texels.
+//! Where the light of a block is known: at the texels of its walls and at the probes of its volume, and which
+//! symmetries both have.
 
+pub mod output_grid;
+pub mod probes;
+pub mod walls;
 pub mod mirrors;
-pub mod warped_mirrors;
+pub mod area_weights;

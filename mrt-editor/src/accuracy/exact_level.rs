@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use mrt_core::geometry::cube::Face;
-use mrt_core::reference::bounces::Bounces as ExactBounces;
+use mrt_core::reference::bounces::ReferenceBounces as ExactBounces;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve;

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
-use mrt_core::reference::bounces::Bounces as ReferenceBounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
 use mrt_core::reference::oracle_file::{
     Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceError, ReferenceFile,

@@ -1,20 +1,13 @@
 //! Binary glTF: the triangles of the default scene with their node transforms, and base colours.
 //!
-//! Textures are not read: a material's colour is `extras.meanBaseColorLinear` where that is given, else its base colour.
-//! The document is read here rather than by a library: a file may name any index and any offset, each of which is
-//! checked where it is used, and a library for all of glTF takes longer to compile than the rest of the import.
-
-mod container;
-mod document;
+//! Accessors are read here, with every offset checked, because the library's iterators slice
+//! without asking; its document model is validated and used for everything else. Textures are not
+//! read: a material's colour is `extras.meanBaseColorLinear` where given, else its base colour.
 
 use super::error::ImportError;
 use super::raw_mesh::{Paint, RawMesh};
-use container::chunks;
-use document::{
-    Accessor, Document, FLOAT, Material, Node, Primitive, TRIANGLES, UNSIGNED_BYTE, UNSIGNED_INT,
-    UNSIGNED_SHORT,
-};
-use glam::{Mat4, Quat, Vec3};
+use glam::{Mat4, Vec3};
+use gltf::accessor::{DataType, Dimensions};
 use std::path::Path;
 
 /// Nodes nested deeper than this are refused; a cycle is deeper than any limit.
@@ -50,210 +43,214 @@ impl Fault {
 }
 
 fn read_mesh(bytes: &[u8]) -> Result<RawMesh, Fault> {
-    let chunks =
-        chunks(bytes).ok_or_else(|| Fault::at("header", "a complete binary glTF 2.0 file"))?;
-    let document = parse(chunks.json)?;
+    let header = || Fault::at("header", "a complete binary glTF 2.0 file");
+    // The library subtracts the header from this length unchecked.
+    let length = bytes.get(8..12).map_or(0, |word| {
+        u32::from_le_bytes([word[0], word[1], word[2], word[3]])
+    });
+    if length < 12 {
+        return Err(header());
+    }
+    let glb = gltf::binary::Glb::from_slice(bytes).map_err(|_| header())?;
+    let document = parse_document(&glb.json).map_err(|error| Fault::at(error, "valid glTF 2.0"))?;
     let mut reader = Reader {
-        document: &document,
-        bin: chunks.bin,
+        bin: glb.bin.as_deref().unwrap_or_default(),
         mesh: RawMesh::default(),
         node_visits: 0,
     };
-    reader.mesh.paints = document.materials.iter().map(paint).collect();
+    reader.mesh.paints = document.materials().map(|m| read_paint(&m)).collect();
     reader.mesh.paints.push(Paint::unnamed());
     let scene = document
-        .scenes
-        .get(document.scene.unwrap_or(0))
-        .ok_or_else(|| Fault::at("scenes", "the default scene, or at least one"))?;
-    for &node in &scene.nodes {
-        reader.add_node(node, Mat4::IDENTITY, 0)?;
+        .default_scene()
+        .or_else(|| document.scenes().next())
+        .ok_or_else(|| Fault::at("scenes", "at least one scene"))?;
+    for node in scene.nodes() {
+        reader.add_node(&node, Mat4::IDENTITY, 0)?;
     }
     Ok(reader.mesh)
 }
 
-fn parse(json: &[u8]) -> Result<Document, Fault> {
-    let document: Document = serde_json::from_slice(json)
-        .map_err(|error| Fault::at(format!("document: {error}"), "valid glTF 2.0"))?;
-    if !document.asset.version.starts_with("2.") {
-        return Err(Fault::at("asset", "glTF of version 2"));
+/// Textures are taken out first: an extension's texture has no `source`, which the library refuses,
+/// and none is needed here.
+fn parse_document(json: &[u8]) -> Result<gltf::Document, String> {
+    let mut json: serde_json::Value =
+        serde_json::from_slice(json).map_err(|error| format!("JSON: {error}"))?;
+    if let Some(root) = json.as_object_mut() {
+        for key in ["textures", "images", "samplers", "animations", "skins"] {
+            root.remove(key);
+        }
+        let remove = |value: &mut serde_json::Value, keys: &[&str]| {
+            if let Some(object) = value.as_object_mut() {
+                for key in keys {
+                    object.remove(*key);
+                }
+            }
+        };
+        for material in list_mut(root.get_mut("materials")) {
+            remove(
+                material,
+                &[
+                    "normalTexture",
+                    "occlusionTexture",
+                    "emissiveTexture",
+                    "extensions",
+                ],
+            );
+            if let Some(pbr) = material.get_mut("pbrMetallicRoughness") {
+                remove(pbr, &["baseColorTexture", "metallicRoughnessTexture"]);
+            }
+        }
+        for node in list_mut(root.get_mut("nodes")) {
+            remove(node, &["skin"]);
+        }
     }
-    match document.extensions_required.first() {
-        Some(name) => Err(Fault::at(
-            format!("extension {name}"),
-            "a file that can be read without extensions",
-        )),
-        None => Ok(document),
-    }
+    let root: gltf::json::Root =
+        gltf::json::deserialize::from_value(json).map_err(|error| format!("document: {error}"))?;
+    gltf::Document::from_json(root).map_err(|error| format!("document: {error}"))
 }
 
-fn paint(material: &Material) -> Paint {
-    let mean = || {
-        let mean = material.extras.get("meanBaseColorLinear")?.as_array()?;
-        let channel = |k: usize| mean.get(k)?.as_f64().map(|x| x as f32);
-        Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
-    };
-    let base = material.pbr_metallic_roughness.base_color_factor;
-    let [r, g, b, _] = base.unwrap_or([1.0; 4]);
-    let name = material.name.as_deref().unwrap_or("unnamed");
-    Paint::new(name, Some(mean().unwrap_or(Vec3::new(r, g, b))))
+fn list_mut(value: Option<&mut serde_json::Value>) -> impl Iterator<Item = &mut serde_json::Value> {
+    value.and_then(|v| v.as_array_mut()).into_iter().flatten()
+}
+
+fn read_paint(material: &gltf::Material<'_>) -> Paint {
+    let mean = material
+        .extras()
+        .as_ref()
+        .and_then(|extras| serde_json::from_str::<serde_json::Value>(extras.get()).ok())
+        .and_then(|extras| {
+            let mean = extras.get("meanBaseColorLinear")?.as_array()?;
+            let channel = |k: usize| mean.get(k)?.as_f64().map(|x| x as f32);
+            Some(Vec3::new(channel(0)?, channel(1)?, channel(2)?))
+        });
+    let [r, g, b, _] = material.pbr_metallic_roughness().base_color_factor();
+    let name = material.name().unwrap_or("unnamed");
+    Paint::new(name, Some(mean.unwrap_or(Vec3::new(r, g, b))))
 }
 
 /// Walks through the document and collects triangles.
 struct Reader<'a> {
-    document: &'a Document,
     bin: &'a [u8],
     mesh: RawMesh,
     node_visits: usize,
 }
 
-impl<'a> Reader<'a> {
-    fn add_node(&mut self, index: usize, parent: Mat4, depth: usize) -> Result<(), Fault> {
+impl Reader<'_> {
+    fn add_node(&mut self, node: &gltf::Node<'_>, parent: Mat4, depth: usize) -> Result<(), Fault> {
         self.node_visits += 1;
         if depth > MAX_NODE_DEPTH || self.node_visits > MAX_NODE_VISITS {
             return Err(Fault::at(
-                format!("node {index}"),
+                format!("node {}", node.index()),
                 "nodes nested at most 256 deep, without cycles, and at most 1,000,000",
             ));
         }
-        let document = self.document;
-        let node = item(&document.nodes, index, "node")?;
-        let world_from_node = parent * transform(node);
-        if let Some(mesh) = node.mesh {
-            for primitive in &item(&document.meshes, mesh, "mesh")?.primitives {
-                if primitive.mode.unwrap_or(TRIANGLES) == TRIANGLES {
-                    self.add_primitive(primitive, world_from_node)?;
-                }
+        let world_from_node = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
+        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives()) {
+            if primitive.mode() == gltf::mesh::Mode::Triangles {
+                self.add_primitive(&primitive, world_from_node)?;
             }
         }
-        for &child in &node.children {
-            self.add_node(child, world_from_node, depth + 1)?;
+        for child in node.children() {
+            self.add_node(&child, world_from_node, depth + 1)?;
         }
         Ok(())
     }
 
-    fn add_primitive(&mut self, primitive: &Primitive, world_from_node: Mat4) -> Result<(), Fault> {
-        let Some(positions) = primitive.attributes.position else {
+    fn add_primitive(
+        &mut self,
+        primitive: &gltf::Primitive<'_>,
+        world_from_node: Mat4,
+    ) -> Result<(), Fault> {
+        let Some(accessor) = primitive.get(&gltf::Semantic::Positions) else {
             return Ok(());
         };
+        if accessor.data_type() != DataType::F32 || accessor.dimensions() != Dimensions::Vec3 {
+            let place = format!("accessor {}", accessor.index());
+            return Err(Fault::at(place, "positions as three 32-bit floats"));
+        }
         let first = self.mesh.positions.len() as u32;
-        let positions = self.positions(positions)?;
-        let to_world = |position| world_from_node.transform_point3(position);
-        let vertex_count = positions.len();
-        self.mesh
-            .positions
-            .extend(positions.into_iter().map(to_world));
-        let indices: Vec<u32> = match primitive.indices {
+        let vertex_count = accessor.count();
+        for element in elements(self.bin, &accessor, 12)? {
+            let number = |k: usize| {
+                f32::from_le_bytes([element[k], element[k + 1], element[k + 2], element[k + 3]])
+            };
+            let position = Vec3::new(number(0), number(4), number(8));
+            self.mesh
+                .positions
+                .push(world_from_node.transform_point3(position));
+        }
+        let indices: Vec<u32> = match primitive.indices() {
             None => (0..vertex_count as u32).collect(),
-            Some(accessor) => self.indices(accessor)?,
+            Some(accessor) => read_indices(self.bin, &accessor)?,
         };
-        if let Some(bad) = indices.iter().find(|&&k| k as usize >= vertex_count) {
+        if let Some(bad) = indices
+            .iter()
+            .find(|&&index| index as usize >= vertex_count)
+        {
             let place = format!("index {bad}");
             return Err(Fault::at(place, "indices below the number of vertices"));
         }
         if self.mesh.triangles.len() + indices.len() / 3 > MAX_TRIANGLES {
             return Err(Fault::at("nodes", "at most 50,000,000 triangles"));
         }
-        let unnamed = self.mesh.paints.len() - 1;
-        let material = primitive.material.unwrap_or(unnamed);
-        if material > unnamed {
-            return Err(absent("material", material));
-        }
+        let material = primitive
+            .material()
+            .index()
+            .unwrap_or(self.mesh.paints.len() - 1);
         for corners in indices.as_chunks::<3>().0 {
             self.mesh.triangles.push(corners.map(|k| first + k));
             self.mesh.triangle_materials.push(material as u32);
         }
         Ok(())
     }
-
-    fn positions(&self, index: usize) -> Result<Vec<Vec3>, Fault> {
-        let accessor = self.accessor(index)?;
-        if accessor.component_type != FLOAT || accessor.element_type != "VEC3" {
-            let place = format!("accessor {index}");
-            return Err(Fault::at(place, "positions as three 32-bit floats"));
-        }
-        let number = |bytes: &[u8; 4]| f32::from_le_bytes(*bytes);
-        let position = |element: &[u8]| match element.as_chunks::<4>().0 {
-            [x, y, z] => Vec3::new(number(x), number(y), number(z)),
-            _ => Vec3::NAN,
-        };
-        Ok(self.elements(index, 12)?.map(position).collect())
-    }
-
-    fn indices(&self, index: usize) -> Result<Vec<u32>, Fault> {
-        let size = match self.accessor(index)?.component_type {
-            UNSIGNED_BYTE => 1,
-            UNSIGNED_SHORT => 2,
-            UNSIGNED_INT => 4,
-            _ => {
-                let place = format!("accessor {index}");
-                return Err(Fault::at(place, "unsigned integer indices"));
-            }
-        };
-        let little_endian = |bytes: &[u8]| {
-            let bytes = bytes.iter().rev();
-            bytes.fold(0u32, |value, &byte| value << 8 | u32::from(byte))
-        };
-        Ok(self.elements(index, size)?.map(little_endian).collect())
-    }
-
-    fn accessor(&self, index: usize) -> Result<&'a Accessor, Fault> {
-        item(&self.document.accessors, index, "accessor")
-    }
-
-    /// The accessor's elements of `size` bytes each, all inside the file.
-    fn elements(
-        &self,
-        index: usize,
-        size: usize,
-    ) -> Result<impl Iterator<Item = &'a [u8]> + use<'a>, Fault> {
-        let fault = |expected| Fault::at(format!("accessor {index}"), expected);
-        let accessor = self.accessor(index)?;
-        if accessor.sparse.is_some() {
-            return Err(fault("no sparse data"));
-        }
-        let views = &self.document.buffer_views;
-        let view = accessor
-            .buffer_view
-            .and_then(|view| views.get(view))
-            .ok_or_else(|| fault("a buffer view that is in the file"))?;
-        let buffer = self.document.buffers.get(view.buffer);
-        if buffer.is_none_or(|buffer| buffer.uri.is_some()) {
-            return Err(fault("its data in the file's own binary chunk"));
-        }
-        let stride = view.byte_stride.unwrap_or(size);
-        let count = accessor.count;
-        let range = || {
-            let end = view.byte_offset.checked_add(view.byte_length)?;
-            let view_bytes = self.bin.get(view.byte_offset..end)?;
-            let bytes = view_bytes.get(accessor.byte_offset..)?;
-            let needed = stride
-                .checked_mul(count.checked_sub(1)?)?
-                .checked_add(size)?;
-            (stride >= size).then(|| bytes.get(..needed)).flatten()
-        };
-        let bytes = range().ok_or_else(|| fault("its data inside the file"))?;
-        Ok((0..count).map(move |k| &bytes[k * stride..k * stride + size]))
-    }
 }
 
-fn item<'a, T>(list: &'a [T], index: usize, kind: &str) -> Result<&'a T, Fault> {
-    list.get(index).ok_or_else(|| absent(kind, index))
+fn read_indices(bin: &[u8], accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, Fault> {
+    let size = match accessor.data_type() {
+        DataType::U8 => 1,
+        DataType::U16 => 2,
+        DataType::U32 => 4,
+        _ => {
+            let place = format!("accessor {}", accessor.index());
+            return Err(Fault::at(place, "unsigned integer indices"));
+        }
+    };
+    let little_endian = |bytes: &[u8]| {
+        bytes
+            .iter()
+            .rev()
+            .fold(0u32, |value, &byte| value << 8 | u32::from(byte))
+    };
+    Ok(elements(bin, accessor, size)?.map(little_endian).collect())
 }
 
-/// The file names an index of something that it does not have.
-fn absent(kind: &str, index: usize) -> Fault {
-    Fault::at(format!("{kind} {index}"), "an index of what is in the file")
-}
-
-fn transform(node: &Node) -> Mat4 {
-    match node.matrix {
-        Some(columns) => Mat4::from_cols_array(&columns),
-        None => Mat4::from_scale_rotation_translation(
-            Vec3::from_array(node.scale.unwrap_or([1.0; 3])),
-            Quat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])),
-            Vec3::from_array(node.translation.unwrap_or([0.0; 3])),
-        ),
+/// The accessor's elements of `size` bytes each, all inside the file.
+fn elements<'a>(
+    bin: &'a [u8],
+    accessor: &gltf::Accessor<'_>,
+    size: usize,
+) -> Result<impl Iterator<Item = &'a [u8]>, Fault> {
+    let fault = |expected| Fault::at(format!("accessor {}", accessor.index()), expected);
+    if accessor.sparse().is_some() {
+        return Err(fault("no sparse data"));
     }
+    let view = accessor.view().ok_or_else(|| fault("a buffer view"))?;
+    if !matches!(view.buffer().source(), gltf::buffer::Source::Bin) {
+        return Err(fault("its data in the file's own binary chunk"));
+    }
+    let stride = view.stride().unwrap_or(size);
+    let count = accessor.count();
+    let range = || {
+        let end = view.offset().checked_add(view.length())?;
+        let view_bytes = bin.get(view.offset()..end)?;
+        let bytes = view_bytes.get(accessor.offset()..)?;
+        let needed = stride
+            .checked_mul(count.checked_sub(1)?)?
+            .checked_add(size)?;
+        (stride >= size).then(|| bytes.get(..needed)).flatten()
+    };
+    let bytes = range().ok_or_else(|| fault("its data inside the file"))?;
+    Ok((0..count).map(move |k| &bytes[k * stride..k * stride + size]))
 }
 
 #[cfg(test)]

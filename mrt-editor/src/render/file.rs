@@ -1,7 +1,9 @@
 //! Pictures as files, which are there whole or not at all.
 
-use super::hdr;
 use super::picture::Picture;
+use image::codecs::hdr::HdrEncoder;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
 use mrt_core::container::{ContainerError, write_file_atomically};
 use std::path::{Path, PathBuf};
 
@@ -25,7 +27,7 @@ pub enum WriteError {
         /// Which file.
         path: PathBuf,
         /// What the encoder says.
-        source: png::EncodingError,
+        source: image::ImageError,
     },
 }
 
@@ -59,21 +61,13 @@ pub fn write_png(
     srgb: &[u8],
     saves: Saves,
 ) -> Result<usize, WriteError> {
+    let compression = match saves {
+        Saves::Time => CompressionType::Fast,
+        Saves::Bytes => CompressionType::Best,
+    };
     let mut bytes = Vec::new();
-    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(match saves {
-        Saves::Time => png::Compression::Fast,
-        Saves::Bytes => png::Compression::High,
-    });
-    encoder.set_filter(png::Filter::Adaptive);
-    encoder
-        .write_header()
-        .and_then(|mut writer| {
-            writer.write_image_data(srgb)?;
-            writer.finish()
-        })
+    PngEncoder::new_with_quality(&mut bytes, compression, FilterType::Adaptive)
+        .write_image(srgb, width as u32, height as u32, ExtendedColorType::Rgb8)
         .map_err(|source| WriteError::Encode {
             path: path.to_owned(),
             source,
@@ -82,10 +76,19 @@ pub fn write_png(
     Ok(bytes.len())
 }
 
-/// Writes linear pixels as Radiance HDR.
+/// Writes linear pixels as Radiance HDR: each channel keeps 8 bits relative to the pixel's brightest one.
 ///
 /// # Errors
-/// [`WriteError::File`].
+/// [`WriteError`].
 pub fn write_hdr(path: &Path, picture: &Picture) -> Result<(), WriteError> {
-    Ok(write_file_atomically(path, &hdr::encode(picture))?)
+    let mut bytes = Vec::new();
+    let pixels = picture.pixels.iter();
+    let pixels: Vec<_> = pixels.map(|colour| image::Rgb(colour.to_array())).collect();
+    HdrEncoder::new(&mut bytes)
+        .encode(&pixels, picture.width, picture.height)
+        .map_err(|source| WriteError::Encode {
+            path: path.to_owned(),
+            source,
+        })?;
+    Ok(write_file_atomically(path, &bytes)?)
 }

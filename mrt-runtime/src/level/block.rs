@@ -6,27 +6,27 @@ use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// More blocks than this are refused: a level of that size is a mistake or an attack.
+/// Most blocks of a level: a larger one is a mistake or an attack.
 pub const MAX_BLOCKS: usize = 100_000;
 
 /// A level: blocks and their connections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Level {
-    /// In the order in which results are given.
+    /// Blocks; results come in this order.
     pub blocks: Vec<Block>,
-    /// Openings that lead into one another. An opening without a connection leads outside: light
-    /// leaves through it, and directional lights shine in.
+    /// Pairs of openings that lead into one another. An opening without a connection leads outside: light leaves
+    /// through it, and directional lights shine in.
     pub connections: Vec<Connection>,
-    /// Connections that can be closed while the game runs, in the order in which a frame counts them.
+    /// Connections that can be closed while the game runs; frames name a door by its position in this list.
     pub doors: Vec<Door>,
 }
 
-/// A connection that can be closed, at run time, by any amount.
+/// A connection that can be closed at run time, partly or wholly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Door {
     /// Index into [`Level::connections`].
     pub connection: usize,
-    /// How much light passes at first, in [0, 1].
+    /// Fraction of light, in [0, 1], that passes at first.
     pub value: f32,
 }
 
@@ -37,14 +37,14 @@ pub struct Block {
     pub shape: &'static Shape,
     /// Turns the canonical shape in the unit cube before it is warped.
     pub orientation: CubeRotation,
-    /// The unit cube's corners in the world, metres.
+    /// Corners of the unit cube in the world, metres.
     pub warp: Hexahedron,
     /// Linear RGB albedo in [0, 1] of each face of the turned cube, in the order of [`Face::ALL`];
     /// entries of openings have no meaning.
     pub albedo: [Vec3; 6],
-    /// Radiosity that each face emits of itself, linear RGB, W/m², in the order of [`Face::ALL`].
+    /// Radiosity that each face emits, linear RGB, W/m², in the order of [`Face::ALL`].
     pub emission: [Vec3; 6],
-    /// Whose operators it uses: the canonical shape's, or those that were made for its warp.
+    /// Which operators light the block: those of the canonical shape, or those made for its warp.
     pub transport: WarpTransport,
 }
 
@@ -57,7 +57,7 @@ pub struct Opening {
     pub face: Face,
 }
 
-/// Two openings that are one.
+/// Two openings that lead into one another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Connection {
     /// One side.
@@ -89,12 +89,12 @@ impl Block {
         self.shape.is_open(self.orientation.inverse().face(face))
     }
 
-    /// The opening in a face of the turned cube, as the canonical shape has it.
+    /// The opening in a face of the turned cube, named by its canonical face.
     pub fn opening(&self, face: Face) -> Option<&'static Aperture> {
         self.shape.opening(self.orientation.inverse().face(face))
     }
 
-    /// The warp as a map from the *canonical* cube: orientation and corners in one.
+    /// The map from the *canonical* cube to the world: the orientation, then the warp.
     pub fn canonical_warp(&self) -> Hexahedron {
         Hexahedron {
             corners: std::array::from_fn(|k| {
@@ -116,7 +116,8 @@ pub(crate) fn corner_index(unit: DVec3) -> usize {
 impl Level {
     /// The opening that each face of each block is connected to, as `[block][face]`.
     ///
-    /// Connections must be in range; [`Level::check`] says so.
+    /// # Panics
+    /// If a connection names a block that does not exist; [`Level::check`] refuses such levels.
     pub fn neighbours(&self) -> Vec<[Option<Opening>; 6]> {
         let mut neighbours = vec![[None; 6]; self.blocks.len()];
         for connection in &self.connections {
@@ -129,7 +130,8 @@ impl Level {
 
     /// The door in each face of each block's turned cube, as an index into [`Level::doors`].
     ///
-    /// Doors and connections must be in range; [`Level::check`] says so.
+    /// # Panics
+    /// If a door or a connection is out of range; [`Level::check`] refuses such levels.
     pub fn door_of_openings(&self) -> Vec<[Option<u32>; 6]> {
         let mut doors = vec![[None; 6]; self.blocks.len()];
         for (index, door) in self.doors.iter().enumerate() {

@@ -3,73 +3,105 @@
 use crate::level::block_index::BlockIndex;
 use glam::{DVec3, UVec3};
 
-/// Cells of a grid for each block, at most: few enough that the grid takes less memory than the blocks.
+/// Cells that a grid has for each block, about: few enough that the grid takes less memory than the blocks.
 const CELLS_PER_BLOCK: f64 = 2.0;
 
-/// Cells along an axis, at most.
+/// Most cells along an axis.
 const MAX_CELLS_PER_AXIS: f64 = 1024.0;
 
-/// Blocks whose bounds reach into each cell of a grid.
+/// Most entries in a grid's lists for each block. Unit cells in rows reach into 27 cells each; in a level with many
+/// large blocks among small ones, the grid gets coarser until its lists are this short.
+const ENTRIES_PER_BLOCK: usize = 64;
+
+/// For each cell of a uniform grid, the blocks whose bounds reach into it.
 #[derive(Clone, Debug)]
 pub(crate) struct BlockGrid {
     low: DVec3,
     cells_per_metre: DVec3,
     cells: UVec3,
-    /// The blocks of cell k, ascending, are `blocks[first[k]..first[k + 1]]`.
+    /// Cell k has the blocks `blocks[first[k]..first[k + 1]]`, ascending.
     first: Vec<u32>,
     blocks: Vec<BlockIndex>,
 }
 
 impl BlockGrid {
-    /// A grid over these bounds (smallest, largest), metres, in the order of the blocks. Points that miss bounds by up
-    /// to `slack` of their diagonal count as inside.
+    /// A grid over the bounds (smallest, largest) of each block, metres, in the order of the blocks. A point that is
+    /// outside some bounds by at most `slack` of their diagonal counts as inside.
     pub(crate) fn new(bounds: &[(DVec3, DVec3)], slack: f64) -> Self {
-        let widened = |&(low, high): &(DVec3, DVec3)| {
-            // Twice, so that the sums below may be rounded.
-            let margin = DVec3::splat(2.0 * slack * (high - low).length());
-            (low - margin, high + margin)
-        };
-        let low = bounds.iter().map(|b| widened(b).0);
-        let low = low.reduce(DVec3::min).unwrap_or(DVec3::ZERO);
-        let high = bounds.iter().map(|b| widened(b).1);
-        let high = high.reduce(DVec3::max).unwrap_or(DVec3::ZERO);
+        let widened: Vec<(DVec3, DVec3)> = bounds
+            .iter()
+            .map(|&(low, high)| {
+                // Twice the slack: a point that counts as inside stays inside when the comparison below is rounded.
+                let margin = DVec3::splat(2.0 * slack * (high - low).length());
+                (low - margin, high + margin)
+            })
+            .collect();
+        let lows = widened.iter().map(|b| b.0);
+        let low = lows.reduce(DVec3::min).unwrap_or(DVec3::ZERO);
+        let highs = widened.iter().map(|b| b.1);
+        let high = highs.reduce(DVec3::max).unwrap_or(DVec3::ZERO);
         let size = (high - low).max(DVec3::splat(f64::MIN_POSITIVE));
-        let cells = cells_along_axes(bounds, size);
-        let mut grid = Self {
+        let mut grid = Self::without_blocks(low, size, cells_along_axes(bounds, size));
+        while grid.entry_count(&widened) > ENTRIES_PER_BLOCK * bounds.len() {
+            let cells = (grid.cells / 2).max(UVec3::ONE);
+            if cells == grid.cells {
+                break;
+            }
+            grid = Self::without_blocks(low, size, cells);
+        }
+        grid.list_blocks(&widened);
+        grid
+    }
+
+    fn without_blocks(low: DVec3, size: DVec3, cells: UVec3) -> Self {
+        Self {
             low,
             cells_per_metre: cells.as_dvec3() / size,
             cells,
             first: Vec::new(),
             blocks: Vec::new(),
+        }
+    }
+
+    /// Number of pairs of a block and a cell that its bounds reach into.
+    fn entry_count(&self, bounds: &[(DVec3, DVec3)]) -> usize {
+        let cells = |&(low, high): &(DVec3, DVec3)| {
+            let reach = self.cell_of(high) - self.cell_of(low) + 1;
+            reach
+                .to_array()
+                .map(|n| n as usize)
+                .iter()
+                .product::<usize>()
         };
+        bounds.iter().map(cells).sum()
+    }
+
+    fn list_blocks(&mut self, bounds: &[(DVec3, DVec3)]) {
         let mut pairs: Vec<(u32, BlockIndex)> = Vec::new();
-        for (index, bounds) in bounds.iter().enumerate() {
-            let (low, high) = widened(bounds);
-            let (from, to) = (grid.cell_of(low), grid.cell_of(high));
+        for (index, &(low, high)) in bounds.iter().enumerate() {
+            let (from, to) = (self.cell_of(low), self.cell_of(high));
             for z in from.z..=to.z {
                 for y in from.y..=to.y {
                     for x in from.x..=to.x {
-                        let cell = grid.position(UVec3::new(x, y, z));
+                        let cell = self.position(UVec3::new(x, y, z));
                         pairs.push((cell as u32, BlockIndex::new(index)));
                     }
                 }
             }
         }
         pairs.sort_unstable();
-        let count = cells.element_product() as usize;
         let mut next = 0;
-        for cell in 0..=count as u32 {
+        for cell in 0..=self.cells.element_product() {
             next += pairs[next..].partition_point(|pair| pair.0 < cell);
-            grid.first.push(next as u32);
+            self.first.push(next as u32);
         }
-        grid.blocks = pairs.into_iter().map(|pair| pair.1).collect();
-        grid
+        self.blocks = pairs.into_iter().map(|pair| pair.1).collect();
     }
 
     /// Blocks whose widened bounds may contain a point, ascending.
     pub(crate) fn near(&self, point: DVec3) -> &[BlockIndex] {
         let place = (point - self.low) * self.cells_per_metre;
-        // NaN is in no range.
+        // Comparisons with NaN are false, so a point with a NaN is outside.
         let is_inside = place.cmpge(DVec3::ZERO).all() && place.cmple(self.cells.as_dvec3()).all();
         if !is_inside {
             return &[];
@@ -78,19 +110,22 @@ impl BlockGrid {
         &self.blocks[self.first[cell] as usize..self.first[cell + 1] as usize]
     }
 
-    /// The cell of a point; of points outside the grid the nearest.
+    /// The cell that contains a point, or the nearest cell to a point outside the grid. It never decreases where a
+    /// coordinate increases, whatever the rounding: a point within bounds is in a cell that lists their block.
     fn cell_of(&self, point: DVec3) -> UVec3 {
         let place = (point - self.low) * self.cells_per_metre;
         let last = (self.cells - 1).as_dvec3();
         place.floor().clamp(DVec3::ZERO, last).as_uvec3()
     }
 
+    /// Index of a cell, x fastest, then y, then z.
     fn position(&self, cell: UVec3) -> usize {
         ((cell.z * self.cells.y + cell.y) * self.cells.x + cell.x) as usize
     }
 }
 
-/// Cells about as large as a mean block, and not many more than blocks.
+/// Number of cells along each axis: cells about as large as the mean block, and about [`CELLS_PER_BLOCK`] times as many
+/// as blocks at most.
 fn cells_along_axes(bounds: &[(DVec3, DVec3)], size: DVec3) -> UVec3 {
     let count = bounds.len().max(1) as f64;
     let sum: DVec3 = bounds.iter().map(|(low, high)| *high - *low).sum();
@@ -100,7 +135,7 @@ fn cells_along_axes(bounds: &[(DVec3, DVec3)], size: DVec3) -> UVec3 {
         .clamp(DVec3::ONE, DVec3::splat(MAX_CELLS_PER_AXIS));
     let excess = wanted.element_product() / (CELLS_PER_BLOCK * count);
     let cells = if excess > 1.0 {
-        // Axes of one cell stay; the others share the excess.
+        // Axes of one cell stay; the others are divided by the same factor.
         let axes = wanted.to_array().iter().filter(|&&n| n > 1.0).count();
         wanted * excess.powf(-1.0 / axes.max(1) as f64)
     } else {
@@ -115,7 +150,7 @@ mod tests {
 
     #[test]
     fn every_block_is_found_wherever_its_bounds_are() {
-        // Blocks of many sizes, one of them around the others, and one far away.
+        // Blocks of many sizes, one that encloses the others, and one far away.
         let mut bounds = vec![(DVec3::splat(-2.0), DVec3::splat(9.0))];
         for k in 0..60 {
             let k = f64::from(k);
@@ -138,6 +173,19 @@ mod tests {
         assert!(grid.near(DVec3::splat(f64::NAN)).is_empty());
         assert!(grid.near(DVec3::splat(-3.0)).is_empty());
         assert!(grid.near(DVec3::splat(f64::INFINITY)).is_empty());
+    }
+
+    #[test]
+    fn large_blocks_among_small_ones_do_not_fill_the_memory() {
+        let small = (0..4000).map(|k| (DVec3::splat(f64::from(k) * 0.01), DVec3::splat(0.005)));
+        let large = (0..2000).map(|k| (DVec3::splat(f64::from(k) * 1e-4), DVec3::splat(39.0)));
+        let bounds: Vec<_> = small
+            .chain(large)
+            .map(|(low, size)| (low, low + size))
+            .collect();
+        let grid = BlockGrid::new(&bounds, 1e-4);
+        assert!(grid.blocks.len() <= ENTRIES_PER_BLOCK * bounds.len());
+        assert!(grid.near(bounds[9].0).contains(&BlockIndex::new(9)));
     }
 
     #[test]

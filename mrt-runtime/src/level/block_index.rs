@@ -1,15 +1,15 @@
-//! Blocks of a level by their position.
+//! The index of a block in its level.
 
 use std::fmt;
 
 /// A block by its position in [`Level::blocks`](crate::level::block::Level::blocks).
 ///
-/// Frames keep blocks in another order, that of [`BlockRank`](crate::output::texel_layout::BlockRank).
+/// Frames store blocks in another order, which [`BlockRank`](crate::output::texel_layout::BlockRank) counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockIndex(u32);
 
 impl BlockIndex {
-    /// The block at this position; positions beyond `u32::MAX` stand for no block of any level.
+    /// The block at `position`. Positions from `u32::MAX` on become `u32::MAX`, which no level has a block at.
     pub const fn new(position: usize) -> Self {
         if position < u32::MAX as usize {
             Self(position as u32)
@@ -18,7 +18,7 @@ impl BlockIndex {
         }
     }
 
-    /// Its position in the level.
+    /// Position of the block in its level.
     pub const fn get(self) -> usize {
         self.0 as usize
     }

@@ -7,19 +7,19 @@ use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 
 impl Level {
-    /// One unit block a cell [x, x+1] x [y, y+1] x [z, z+1]; cells that share a face are joined.
+    /// One unit block for each cell [x, x+1] x [y, y+1] x [z, z+1]; cells that share a face are joined.
     ///
     /// # Errors
-    /// [`CellsError`] when a cell is given twice.
+    /// [`CellsError`], when a cell is given twice or no shape has its openings.
     pub fn from_cells(cells: &[[i32; 3]], albedo: Vec3) -> Result<Level, CellsError> {
         Self::from_joined_cells(cells, albedo, |_, _| true)
     }
 
-    /// As [`Level::from_cells`], with a wall between cells of which `is_joined(first, second)` is false; it must say
-    /// the same for both orders.
+    /// Same as [`Level::from_cells`], but neighbouring cells have a wall between them where `is_joined` is false. It
+    /// gets the positions of both cells, and must return the same for both orders.
     ///
     /// # Errors
-    /// [`CellsError`].
+    /// [`CellsError`], when a cell is given twice or no shape has its openings.
     pub fn from_joined_cells(
         cells: &[[i32; 3]],
         albedo: Vec3,
@@ -81,7 +81,7 @@ impl Level {
 /// Why cells are not a level.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CellsError {
-    /// The same cell twice.
+    /// A cell is given twice.
     #[error("cell {cell:?} stands at positions {first} and {second}; expected once")]
     Twice {
         /// The cell.
@@ -91,7 +91,7 @@ pub enum CellsError {
         /// Second position.
         second: usize,
     },
-    /// No shape has these openings.
+    /// No shape has exactly the openings of a cell.
     #[error("cell {cell:?} opens towards {openings:?}; expected the openings of a shape")]
     NoShape {
         /// The cell.
@@ -101,7 +101,8 @@ pub enum CellsError {
     },
 }
 
-/// The shape and the rotation that leave exactly these faces open, about +Y where that is enough.
+/// The shape and the rotation that leave exactly the faces `open` without a wall; a rotation about +Y where one
+/// suffices.
 pub fn shape_with_openings(open: &[Face]) -> Option<(&'static Shape, CubeRotation)> {
     let upright = (0..4).map(CubeRotation::about_y);
     upright.chain(CubeRotation::all()).find_map(|rotation| {

@@ -1,18 +1,18 @@
-//! What assembly and frames rely on about a level, checked once.
+//! Checks, once, what assembly and frames rely on.
 
-use crate::level::block::{Connection, Level, MAX_BLOCKS, Opening};
+use crate::level::block::{Block, Connection, Level, MAX_BLOCKS, Opening};
 use crate::level::error::{FAR_LIMIT, JOIN_TOLERANCE, LevelError};
 use crate::level::overlap;
 use crate::level::shape::Outline;
 use crate::light::limits::MAX_LIGHT_VALUE;
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 
 impl Level {
     /// Checks everything that assembly and the frame rely on.
     ///
     /// # Errors
-    /// The first [`LevelError`] found, blocks before connections before overlaps.
+    /// The first [`LevelError`] found: of blocks, then of connections, then of doors, then of overlaps.
     pub fn check(&self) -> Result<(), LevelError> {
         let count = self.blocks.len();
         if count == 0 {
@@ -25,45 +25,11 @@ impl Level {
             });
         }
         for (index, block) in self.blocks.iter().enumerate() {
-            block.warp.check().map_err(|source| LevelError::Warp {
-                block: index,
-                source,
-            })?;
-            let (min, max) = block.warp.bounds();
-            let found = min.abs().max(max.abs()).max_element();
-            let expected = FAR_LIMIT * block.warp.diagonal();
-            if found > expected {
-                return Err(LevelError::TooFar {
-                    block: index,
-                    expected,
-                    found,
-                });
-            }
-            for face in Face::ALL {
-                let albedo = block.albedo[face.index()];
-                let legal = albedo.to_array().iter().all(|a| (0.0..=1.0).contains(a));
-                if !legal {
-                    return Err(LevelError::Albedo {
-                        block: index,
-                        face,
-                        found: albedo,
-                    });
-                }
-                let emission = block.emission[face.index()];
-                let legal = emission
-                    .to_array()
-                    .iter()
-                    .all(|e| (0.0..=MAX_LIGHT_VALUE).contains(e));
-                if !legal {
-                    return Err(LevelError::Emission {
-                        block: index,
-                        face,
-                        found: emission,
-                    });
-                }
-            }
+            check_warp(index, block)?;
+            check_colours(index, block)?;
         }
         self.check_connections()?;
+        self.check_doors()?;
         overlap::check(self)
     }
 
@@ -97,6 +63,11 @@ impl Level {
             self.check_outlines(ends)?;
             self.check_interface(ends)?;
         }
+        Ok(())
+    }
+
+    /// Each door closes a connection of its own, by a fraction.
+    fn check_doors(&self) -> Result<(), LevelError> {
         let mut has_door = vec![false; self.connections.len()];
         for (index, door) in self.doors.iter().enumerate() {
             let is_first = has_door
@@ -159,4 +130,48 @@ impl Level {
         }
         Ok(())
     }
+}
+
+fn check_warp(index: usize, block: &Block) -> Result<(), LevelError> {
+    block.warp.check().map_err(|source| LevelError::Warp {
+        block: index,
+        source,
+    })?;
+    let (min, max) = block.warp.bounds();
+    let found = min.abs().max(max.abs()).max_element();
+    let expected = FAR_LIMIT * block.warp.diagonal();
+    if found > expected {
+        return Err(LevelError::TooFar {
+            block: index,
+            expected,
+            found,
+        });
+    }
+    Ok(())
+}
+
+fn check_colours(index: usize, block: &Block) -> Result<(), LevelError> {
+    let is_within = |colour: Vec3, largest: f32| {
+        let mut channels = colour.to_array().into_iter();
+        channels.all(|x| (0.0..=largest).contains(&x))
+    };
+    for face in Face::ALL {
+        let albedo = block.albedo[face.index()];
+        if !is_within(albedo, 1.0) {
+            return Err(LevelError::Albedo {
+                block: index,
+                face,
+                found: albedo,
+            });
+        }
+        let emission = block.emission[face.index()];
+        if !is_within(emission, MAX_LIGHT_VALUE) {
+            return Err(LevelError::Emission {
+                block: index,
+                face,
+                found: emission,
+            });
+        }
+    }
+    Ok(())
 }

@@ -1,40 +1,40 @@
-//! What is wrong with a level, and the limits behind it.
+//! Why a level is refused, and the limits that it must keep.
 
 use crate::light::limits::MAX_LIGHT_VALUE;
 use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::HexahedronError;
 
-/// Corners of joined faces must meet within this fraction of the block's diagonal.
+/// Corners of joined faces may be this far apart, as a fraction of the smaller block's diagonal.
 pub const JOIN_TOLERANCE: f64 = 1e-3;
 
-/// Coordinates may be at most this many diagonals of a block: texel positions in `f32` are then good to a
-/// thousandth of it, a fortieth of a texel at 16².
+/// Largest coordinate of a block, in diagonals of that block. Texel positions in `f32` are then good to a thousandth of
+/// the diagonal, a fortieth of a texel at 16² texels a wall.
 pub const FAR_LIMIT: f64 = 1e4;
 
-/// Blocks may enter each other by this fraction of their smaller diagonal before they overlap.
+/// Two blocks may enter each other by this fraction of the smaller one's diagonal before they count as overlapping.
 pub const OVERLAP_TOLERANCE: f64 = 1e-2;
 
-/// What is wrong with a level.
+/// Why a level is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevelError {
-    /// No block at all.
+    /// The level has no block.
     #[error("the level has no block; expected at least one")]
     Empty,
-    /// Above [`MAX_BLOCKS`].
+    /// The level has more blocks than [`MAX_BLOCKS`](crate::level::block::MAX_BLOCKS).
     #[error("the level has {found} blocks; expected at most {expected}")]
     TooManyBlocks {
-        /// [`MAX_BLOCKS`].
+        /// Most blocks accepted.
         expected: usize,
         /// Blocks in the level.
         found: usize,
     },
-    /// The eight corners are not the image of a cube.
+    /// The eight corners of a block do not make a warped cube.
     #[error("block {block}: {source}")]
     Warp {
         /// Which block.
         block: usize,
-        /// What is wrong with it.
+        /// What is wrong with the corners.
         source: HexahedronError,
     },
     /// An albedo is NaN, negative or above one.
@@ -47,7 +47,7 @@ pub enum LevelError {
         /// The albedo there.
         found: Vec3,
     },
-    /// An emission is NaN, negative or absurd.
+    /// An emission is NaN, negative or above [`MAX_LIGHT_VALUE`].
     #[error(
         "block {block}, face {face}: emission {found}; expected three values in [0, {MAX_LIGHT_VALUE:e}]"
     )]
@@ -59,7 +59,7 @@ pub enum LevelError {
         /// The emission there.
         found: Vec3,
     },
-    /// A door is nowhere, or not a fraction.
+    /// A door names no connection or one that has a door already, or its value is not in [0, 1].
     #[error(
         "door {door}: connection {connection}, value {found}; expected one of {count} connections, each with \
          one door at most, and a value in [0, 1]"
@@ -67,14 +67,14 @@ pub enum LevelError {
     Door {
         /// Which door.
         door: usize,
-        /// The connection that it names.
+        /// The connection that the door names.
         connection: usize,
         /// Number of connections.
         count: usize,
-        /// Its value.
+        /// Value of the door.
         found: f32,
     },
-    /// Two openings meet whose outlines differ.
+    /// Two joined openings have different outlines.
     #[error(
         "face {face} of block {block} has {found}, and face {other_face} of block {other} {expected}; expected \
          the same on both sides"
@@ -88,12 +88,12 @@ pub enum LevelError {
         other: usize,
         /// Its face.
         other_face: Face,
-        /// What the other face has.
+        /// Outline in the other face.
         expected: String,
-        /// What the face has.
+        /// Outline in the face.
         found: String,
     },
-    /// A connection names a block that is not there.
+    /// A connection names a block that does not exist.
     #[error("connection {connection}: block {found}; expected an index below {expected}")]
     NoSuchBlock {
         /// Which connection.
@@ -115,7 +115,7 @@ pub enum LevelError {
         block: usize,
         /// Which face of it.
         face: Face,
-        /// Its shape.
+        /// Shape of the block.
         shape: &'static str,
     },
     /// An opening is connected more than once, or to itself.
@@ -125,7 +125,7 @@ pub enum LevelError {
         block: usize,
         /// Which face of it.
         face: Face,
-        /// Connections that name it.
+        /// Connections that name the opening.
         found: usize,
     },
     /// The corners of two joined faces are in different places.
@@ -147,15 +147,15 @@ pub enum LevelError {
         /// Largest distance between corners that should meet, metres.
         found: f64,
     },
-    /// Blocks whose bounding boxes overlap one another by the hundred.
+    /// The bounding boxes of blocks overlap so many others that a test of every pair would take too long.
     #[error(
         "blocks are packed so that each bounding box meets over {expected} others; expected fewer"
     )]
     TooCrowded {
-        /// Pairs a block that are tested.
+        /// Most pairs that are tested, for each block.
         expected: usize,
     },
-    /// Too far from the origin for positions in single precision.
+    /// A block is too far from the origin for positions in single precision.
     #[error(
         "block {block}: a corner is {found:.3e} m from the origin along an axis; expected at most \
          {expected:.3e} m, {FAR_LIMIT:.0e} of the block's diagonals"

@@ -1,14 +1,14 @@
-//! Mazes of any size: levels to measure with.
+//! Mazes of any size, for measurements.
 
 use crate::level::block::{Level, MAX_BLOCKS};
 use glam::Vec3;
 use std::collections::BTreeSet;
 
-/// Share of the walls between neighbouring cells that a maze leaves out beyond what joins all cells: loops.
+/// Share of the walls between neighbouring cells that a maze leaves out to make loops, once all cells are joined.
 const LOOPS: f64 = 0.1;
 
-/// A flat maze of `count` cells of 1 m, nearly square, with corridors, bends, junctions and some loops; the same
-/// for the same `seed` everywhere. At least one cell, at most [`MAX_BLOCKS`].
+/// A flat, nearly square maze of `count` cells of 1 m, with corridors, bends, junctions and some loops. The same `seed`
+/// gives the same maze on every machine. `count` is clamped to 1 ..= [`MAX_BLOCKS`].
 pub fn maze(count: usize, albedo: Vec3, seed: u64) -> Level {
     let count = count.clamp(1, MAX_BLOCKS);
     let width = (1..).find(|w| w * w >= count).unwrap_or(count);
@@ -24,7 +24,7 @@ pub fn maze(count: usize, albedo: Vec3, seed: u64) -> Level {
         ];
         sides.into_iter().flatten().filter(|&next| next < count)
     };
-    // Depth first from the first cell: long corridors, every cell reached.
+    // A walk depth first from the first cell makes long corridors and reaches every cell.
     let mut seen = vec![false; count];
     seen[0] = true;
     let mut trail = vec![0];
@@ -55,10 +55,11 @@ pub fn maze(count: usize, albedo: Vec3, seed: u64) -> Level {
     .expect("cells differ, and any flat cell has a shape")
 }
 
-/// Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
+/// Random numbers by SplitMix64: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014.
 struct SplitMix(u64);
 
 impl SplitMix {
+    /// A number below `count`.
     fn below(&mut self, count: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;

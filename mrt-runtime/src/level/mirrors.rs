@@ -1,4 +1,4 @@
-//! The mirrors that leave a canonical shape as it is.
+//! The mirrors that map a canonical shape onto itself.
 
 use crate::level::shape::{Outline, Shape};
 use glam::DVec3;
@@ -6,7 +6,8 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::texel_permutation;
 
-/// True if the map takes every opening to one of the same outline; holes know up, so it must keep y there.
+/// True if `map` takes every opening to an opening of the same outline. Doors and windows have an upper and a lower
+/// edge, so +y must stay +y for them.
 fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
     shape.openings.iter().all(|opening| {
         let same = shape
@@ -17,8 +18,8 @@ fn keeps(map: CubeSymmetry, shape: &Shape) -> bool {
     })
 }
 
-/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of
-/// two axes neither of which has one.
+/// A largest set of commuting mirrors of the shape: the axis mirrors that keep its openings, and an exchange of two
+/// axes without an axis mirror.
 pub fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
     let axes: Vec<usize> = (0..3)
         .filter(|&axis| keeps(CubeSymmetry::mirror(axis), shape))
@@ -34,7 +35,7 @@ pub fn mirrors(shape: &Shape) -> Vec<CubeSymmetry> {
         .collect()
 }
 
-/// Where a symmetry of a cube takes its texels.
+/// For each texel of the shape, the texel that a symmetry of the cube takes it to.
 ///
 /// # Panics
 /// If the symmetry does not keep the shape.

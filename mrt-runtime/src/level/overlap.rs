@@ -8,8 +8,8 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Checks that no two blocks of the level enter each other deeper than [`OVERLAP_TOLERANCE`].
 ///
-/// Blocks are taken as the convex hulls of their corners, which warped blocks stay inside of. Pairs
-/// are found by sweeping along x, so the cost is near-linear in levels that are not stacked up.
+/// Each block is replaced by the convex hull of its corners, which contains the warped block. A sweep along x finds the
+/// pairs to test, so the cost is near-linear unless many blocks share a range of x.
 pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     let bounds: Vec<_> = level.blocks.iter().map(|b| b.warp.bounds()).collect();
     let mut order: Vec<usize> = (0..bounds.len()).collect();
@@ -31,7 +31,7 @@ pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
                     expected: MAX_TESTS_PER_BLOCK,
                 });
             }
-            // Hulls of bent blocks stick out of them by no more than their faces are bent.
+            // The hull of a bent block reaches beyond the block by no more than its faces are bent.
             let expected = OVERLAP_TOLERANCE * warp_a.diagonal().min(warp_b.diagonal())
                 + bend(warp_a)
                 + bend(warp_b);
@@ -50,12 +50,11 @@ pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     Ok(())
 }
 
-/// Pairs of blocks with overlapping bounds that are tested, at most, times the number of blocks. Real levels
-/// have a dozen neighbours a block.
+/// Most pairs of blocks with overlapping bounds that are tested, for each block of the level. Blocks of real levels
+/// have a dozen neighbours.
 pub(crate) const MAX_TESTS_PER_BLOCK: usize = 256;
 
-/// How far a block's faces are from planar, metres: the largest distance between the two diagonals of a
-/// face.
+/// How far the faces of a block are from planar, metres: the largest distance between the two diagonals of a face.
 fn bend(block: &Hexahedron) -> f64 {
     Face::ALL
         .into_iter()
@@ -69,8 +68,8 @@ fn bend(block: &Hexahedron) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Smallest overlap of the two hulls' shadows over all candidate axes, metres, or the first that is at
-/// most `enough`; negative when an axis separates them.
+/// Depth, metres, by which two hulls enter each other: the smallest overlap of their shadows over all candidate axes,
+/// negative when an axis separates them. The search ends at the first overlap of at most `enough`.
 fn penetration(a: &Hexahedron, b: &Hexahedron, enough: f64) -> f64 {
     let (edges_a, edges_b) = (edges(a), edges(b));
     let normals = [a, b].into_iter().flat_map(|block| {
@@ -91,6 +90,7 @@ fn penetration(a: &Hexahedron, b: &Hexahedron, enough: f64) -> f64 {
     smallest
 }
 
+/// Overlap, metres, of the projections of two hulls on a unit axis.
 fn shadow_overlap(a: &Hexahedron, b: &Hexahedron, axis: DVec3) -> f64 {
     let shadow = |block: &Hexahedron| {
         block
@@ -103,7 +103,8 @@ fn shadow_overlap(a: &Hexahedron, b: &Hexahedron, axis: DVec3) -> f64 {
     (a_max - b_min).min(b_max - a_min)
 }
 
-/// A warped face may be bent: either diagonal may be the ridge of the hull.
+/// Normals, not of unit length, of the triangles that a face may have in the hull: where it is bent, either diagonal
+/// may be a ridge.
 fn triangle_normals(quad: &[DVec3; 4]) -> [DVec3; 4] {
     std::array::from_fn(|k| {
         let [p, q, r] = [quad[k], quad[(k + 1) % 4], quad[(k + 2) % 4]];
@@ -111,7 +112,8 @@ fn triangle_normals(quad: &[DVec3; 4]) -> [DVec3; 4] {
     })
 }
 
-/// Edges of the hull: those of the cube, and the diagonals of faces, which may be bent along either.
+/// Directions of all possible edges of the hull: the edges of the cube, and both diagonals of each face, since a bent
+/// face may have a ridge along either.
 fn edges(block: &Hexahedron) -> Vec<DVec3> {
     let mut edges = Vec::with_capacity(24);
     for k in 0..8usize {

@@ -1,6 +1,6 @@
-//! A level whose blocks stand ready to be lit: each in its canonical frame, with what lies beyond its openings.
+//! A level ready to be lit: each block in its canonical frame, with its neighbours beyond its openings.
 //!
-//! This is what every method shares about a level; it knows nothing of operators.
+//! All methods share this; it knows nothing of operators.
 
 use crate::level::block_grid::BlockGrid;
 use crate::level::block_index::BlockIndex;
@@ -11,7 +11,7 @@ use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 use std::ops::Range;
 
-/// Points may lie outside a block by this fraction of its width and still count as inside.
+/// A point outside a block by at most this fraction of the block's width still counts as inside.
 pub const BLOCK_TOLERANCE: f64 = 1e-4;
 
 /// The blocks of a level, and its doors.
@@ -21,36 +21,36 @@ pub struct PlacedLevel {
     pub resolution: usize,
     /// In the order of the level's blocks.
     pub blocks: Vec<PlacedBlock>,
-    /// Doors in the order of the level's, with the fraction of light in [0, 1] that each lets through at first.
+    /// For each door of the level, the fraction of light in [0, 1] that it lets through at first.
     pub doors: Vec<f32>,
-    /// Finds the blocks near a point.
+    /// Finds the blocks near a point in constant time.
     pub(crate) grid: BlockGrid,
 }
 
 /// A block in its canonical frame: faces, texels and warp contain the orientation.
 #[derive(Clone, Debug)]
 pub struct PlacedBlock {
-    /// Its canonical shape.
+    /// Canonical shape of the block.
     pub shape: &'static Shape,
-    /// Takes the canonical shape to the level's turned cube.
+    /// Rotation from the canonical cube to the turned cube of the level.
     pub orientation: CubeRotation,
-    /// From the canonical cube to the world, metres.
+    /// Map from the canonical cube to the world, metres.
     pub warp: Hexahedron,
-    /// The way back.
+    /// Inverse of `warp`.
     pub unit_from_world: UnitFromWorld,
     /// What lies beyond each canonical face.
     pub beyond: [Beyond; 6],
-    /// Its part of the level's texels.
+    /// Indices of the block's texels among all texels of the level.
     pub texels: Range<usize>,
     /// Index into [`PlacedLevel::doors`] of the door in each canonical face.
     pub doors: [Option<u32>; 6],
-    /// All openings as loops in the world, in the order of the shape's list.
+    /// Outlines in the world of all openings, in the order of [`Shape::openings`].
     pub portals: Vec<Portal>,
     /// Axis-aligned bounds (smallest, largest), metres.
     pub bounds: (DVec3, DVec3),
-    /// Linear RGB albedo of each canonical face at first; frames change their own copy.
+    /// Linear RGB albedo of each canonical face at first; frames keep a copy that a game may change.
     pub albedo: [Vec3; 6],
-    /// Radiosity that each canonical face emits of itself at first, linear RGB, W/m².
+    /// Radiosity that each canonical face emits at first, linear RGB, W/m²; frames keep a copy that a game may change.
     pub emission: [Vec3; 6],
 }
 
@@ -59,10 +59,10 @@ pub struct PlacedBlock {
 pub struct Portal {
     /// The canonical face.
     pub face: Face,
-    /// Corners in a loop that runs clockwise seen from inside the block, metres: four, or those of a polygon
-    /// around a disc.
+    /// Corners, metres, in a loop that runs clockwise seen from inside the block: four, or 32 of a polygon around a
+    /// disc.
     pub corners: Vec<DVec3>,
-    /// Out of the block, at the first corner; not of unit length.
+    /// Normal out of the block at the first corner, not of unit length.
     pub outward: DVec3,
 }
 
@@ -87,7 +87,7 @@ impl Portal {
         }
     }
 
-    /// Where a line passes the plane of the opening; the origin if it runs along it.
+    /// The point where a line crosses the plane of the opening; `origin` if the line is parallel to the plane.
     pub(crate) fn crossing(&self, origin: DVec3, direction: DVec3) -> DVec3 {
         let along = direction.dot(self.outward);
         if along == 0.0 {
@@ -108,15 +108,15 @@ pub enum Beyond {
     Block {
         /// Which block.
         block: BlockIndex,
-        /// The canonical face of it that is joined to this one.
+        /// The canonical face of that block that is joined to this one.
         face: Face,
-        /// Takes directions of its canonical cube to directions of this block's.
+        /// Rotation from the other block's canonical cube to this block's.
         here_from_there: CubeRotation,
     },
 }
 
 impl PlacedBlock {
-    /// True if the block contains a point, or misses it by at most `slack` block widths.
+    /// True if a point, metres, is inside the block, or outside by at most `slack` block widths.
     fn contains(&self, point: DVec3, slack: f64) -> bool {
         let (min, max) = self.bounds;
         let margin = DVec3::splat(slack) * (max - min).length();
@@ -126,7 +126,8 @@ impl PlacedBlock {
             && self.is_inside_walls(point, slack)
     }
 
-    /// True unless a point of the block's cube is outside the round wall in it by more than `tolerance` block widths.
+    /// False if the block is a tube and a point of its cube is outside the round wall by more than `tolerance` block
+    /// widths.
     fn is_inside_walls(&self, point: DVec3, tolerance: f64) -> bool {
         self.shape.tube().is_none()
             || self
@@ -141,14 +142,15 @@ impl PlacedLevel {
         self.blocks.last().map_or(0, |block| block.texels.end)
     }
 
-    /// The block at this index, if there is one.
+    /// The block at an index; `None` if the level has no such block.
     pub fn block(&self, index: BlockIndex) -> Option<&PlacedBlock> {
         self.blocks.get(index.get())
     }
 
-    /// The first block that contains a point in metres, else the first that it lies within [`BLOCK_TOLERANCE`] of.
+    /// The first block that contains a point, metres; if none does, the first that contains it within
+    /// [`BLOCK_TOLERANCE`].
     ///
-    /// Cost: that of the few blocks near the point, however many the level has.
+    /// Cost: a test of each of the few blocks near the point, however many the level has.
     pub fn block_at(&self, point: DVec3) -> Option<BlockIndex> {
         let near = self.grid.near(point);
         let containing = |slack: f64| {
@@ -158,7 +160,7 @@ impl PlacedLevel {
         containing(0.0).or_else(|| containing(BLOCK_TOLERANCE))
     }
 
-    /// The first block whose cube contains a point that is outside the round wall in it.
+    /// The first tube whose cube contains a point, inside or outside the round wall.
     pub(crate) fn tube_around(&self, point: DVec3) -> Option<BlockIndex> {
         let is_around = |index: &BlockIndex| {
             let block = &self.blocks[index.get()];
@@ -167,9 +169,9 @@ impl PlacedLevel {
         self.grid.near(point).iter().copied().find(is_around)
     }
 
-    /// Index within a block of the texel at (row, column) of a face *as the level names it*, after orientation; `None`
-    /// for openings, and for blocks and texels that do not exist. Rows and columns of a tube are those of the flat face
-    /// that its chart is named by.
+    /// Index within a block of the texel at (row, column) of a face *as the level names it*, after orientation. For a
+    /// tube, row and column count on the flat face that names the chart. `None` for openings, and for blocks and texels
+    /// that do not exist.
     pub fn level_texel(
         &self,
         block: BlockIndex,

@@ -2,64 +2,65 @@
 //! round tubes.
 //!
 //! A shape is data. Adding one means adding a line to [`SHAPES`] and its name to a set of [`SHAPE_SETS`];
-//! everything else, tests included, sweeps over those lists. What a tube's wall looks like is in [`crate::level::wall`].
+//! everything else, tests included, sweeps over those lists. The round walls of tubes are in [`crate::level::wall`].
 
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::{TUBE_RADIUS, TubeForm};
 use std::f64::consts::PI;
 
-/// A unit cube some of whose faces are open, wholly or in part, or a tube in it.
+/// A unit cube with open faces or holes in faces, or a tube inside a unit cube.
 #[derive(Debug, PartialEq)]
 pub struct Shape {
-    /// Used in level and dictionary files.
+    /// Name in level and dictionary files.
     pub name: &'static str,
-    /// What its walls are.
+    /// Form of the walls.
     pub form: WallForm,
-    /// Where light passes; at most one a face, in the order of [`Face::ALL`].
+    /// Where light passes: at most one opening in each face, in the order of [`Face::ALL`].
     pub openings: &'static [Aperture],
 }
 
-/// What the walls of a shape are.
+/// Form of the walls of a shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WallForm {
     /// Faces of the cube.
     Cube,
-    /// A round wall, in four charts named by the faces that it does not open through.
+    /// A round wall in four charts. Each chart is named by a face that the tube does not open through.
     Tube(TubeForm),
 }
 
 /// An opening of a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aperture {
-    /// The face that it is in.
+    /// The face with the opening.
     pub face: Face,
-    /// Its outline there.
+    /// Outline of the opening in the face.
     pub outline: Outline,
 }
 
-/// What part of a face an opening takes.
+/// The part of a face that an opening takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outline {
     /// The whole face, which is missing.
     Whole,
     /// A hole in a wall.
     Hole(Hole),
-    /// The round end of a tube, of radius [`TUBE_RADIUS`] about the middle of the face. Nothing else is there.
+    /// The round end of a tube, of radius [`TUBE_RADIUS`] about the middle of the face. The rest of the face is neither
+    /// wall nor opening.
     Disc,
 }
 
-/// Corners of the polygon that stands for a disc. It is drawn around the disc, so that light which grazes the wall
-/// on both sides of an opening passes; at its corners it is 0.002 block widths too wide.
+/// Number of corners of the polygon that stands for a disc. The polygon contains the disc, so that light which grazes
+/// the wall on both sides of an opening passes; at its corners it is 0.002 block widths too wide.
 const DISC_CORNERS: usize = 32;
 
-/// A rectangle in a wall, in the face's (u, v). Both faces that meet at it must see the same rectangle, so it is
-/// symmetric in u.
+/// A rectangle in a wall, in the face's (u, v). It is symmetric in u, so that the two faces that meet there have the
+/// same rectangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hole {
-    /// 0.4 wide, from the floor to 0.7: reaches down to the face's lower edge.
+    /// 0.4 wide, from the floor to 0.7 above it.
     Doorway,
-    /// 0.5 x 0.4, from 0.4 to 0.8 above the floor.
+    /// 0.5 wide, from 0.4 to 0.8 above the floor.
     Window,
 }
 
@@ -75,7 +76,7 @@ impl Hole {
         }
     }
 
-    /// The position in [`Hole::ALL`].
+    /// Position in [`Hole::ALL`].
     pub fn index(self) -> usize {
         self as usize
     }
@@ -163,9 +164,9 @@ const fn tube(name: &'static str, form: TubeForm, openings: &'static [Aperture])
     }
 }
 
-/// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six are those with side faces
-/// missing), rooms with a door or a window, and tubes. A left and a right bend are the one `bend`, in two
-/// orientations; so are those that lead up and down.
+/// Every shape: all cubes with 0 to 6 faces missing up to rotation (the first six have missing faces at the sides
+/// only), rooms with a door or a window, and tubes. Bends to the left, to the right, up and down are orientations of
+/// the one `bend`.
 pub static SHAPES: [Shape; 16] = [
     shape("closed", &[]),
     shape("dead_end", &[POS_X]),
@@ -232,7 +233,7 @@ pub static SHAPE_SETS: [(&str, &[&str]); 4] = [
     ("cylinders", &["tube", "bend"]),
 ];
 
-/// The shapes of a set of [`SHAPE_SETS`].
+/// The shapes of the set of that name; `None` if [`SHAPE_SETS`] has no such set.
 pub fn shape_set(name: &str) -> Option<Vec<&'static Shape>> {
     let (_, names) = SHAPE_SETS.iter().find(|(set, _)| *set == name)?;
     names.iter().map(|name| Shape::from_name(name)).collect()
@@ -244,7 +245,7 @@ pub fn cubes() -> impl Iterator<Item = &'static Shape> {
 }
 
 impl Shape {
-    /// The shape of that name.
+    /// The shape of that name; `None` if there is none.
     pub fn from_name(name: &str) -> Option<&'static Shape> {
         SHAPES.iter().find(|shape| shape.name == name)
     }
@@ -257,18 +258,18 @@ impl Shape {
         }
     }
 
-    /// True when there is no wall in the face: it is missing, or a tube ends there.
+    /// True when a face has no wall: it is missing, or a tube ends there.
     pub fn is_open(&self, face: Face) -> bool {
         self.opening(face)
             .is_some_and(|opening| !matches!(opening.outline, Outline::Hole(_)))
     }
 
-    /// The opening in a face.
+    /// The opening in a face; `None` for a closed wall.
     pub fn opening(&self, face: Face) -> Option<&Aperture> {
         self.openings.iter().find(|opening| opening.face == face)
     }
 
-    /// Faces that are there, at least in part, in the order of [`Face::ALL`]; they carry the texels.
+    /// Faces with a wall, whole or with a hole, in the order of [`Face::ALL`]; they carry the texels.
     pub fn walls(&self) -> impl Iterator<Item = Face> + '_ {
         Face::ALL.into_iter().filter(|&face| !self.is_open(face))
     }
@@ -278,19 +279,19 @@ impl Shape {
         self.walls().count()
     }
 
-    /// Number of texels at `resolution`² a wall, those in the hole of a wall included: they stay dark.
+    /// Number of texels at `resolution`² a wall. Texels in a hole count; they stay dark.
     pub fn texel_count(&self, resolution: usize) -> usize {
         self.wall_count() * resolution * resolution
     }
 
-    /// Index of a wall's first texel, or `None` for a missing face.
+    /// Index of the first texel of a wall; `None` for a face without wall.
     pub fn wall_offset(&self, face: Face, resolution: usize) -> Option<usize> {
         let position = self.walls().position(|wall| wall == face)?;
         Some(position * resolution * resolution)
     }
 
-    /// Texels in storage order: wall by wall, row (v) by row, column (u) by column, with the centre
-    /// in the unit cube.
+    /// The wall of each texel and the texel's centre in the unit cube, in storage order: wall by wall, row (v) by row,
+    /// column (u) by column.
     pub fn texels(&self, resolution: usize) -> impl Iterator<Item = (Face, DVec3)> + '_ {
         let tube = self.tube();
         self.walls().flat_map(move |face| {
@@ -306,7 +307,7 @@ impl Shape {
         })
     }
 
-    /// True when a texel's centre is in the hole of its wall.
+    /// True when the centre of a texel of wall `face` is in a hole of the wall.
     pub fn is_in_hole(&self, face: Face, center: DVec3) -> bool {
         let Some(Outline::Hole(hole)) = self.opening(face).map(|opening| opening.outline) else {
             return false;
@@ -316,7 +317,7 @@ impl Shape {
         within(u, center[face.u_axis()]) && within(v, center[face.v_axis()])
     }
 
-    /// The index in [`SHAPES`].
+    /// Position in [`SHAPES`].
     pub fn index(&'static self) -> usize {
         SHAPES
             .iter()

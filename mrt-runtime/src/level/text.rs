@@ -18,7 +18,7 @@
 //! albedo = [0.7, 0.7, 0.7]
 //! face_albedo = { "-y" = [0.4, 0.2, 0.1] }
 //! face_emission = { "+y" = [3.0, 3.0, 2.5] }   # W/m², a panel that is lit
-//! transport = "regathered"     # or "rebuilt": operators made for this warp by `mrt adapt`
+//! transport = "regathered"     # or "rebuilt": operators made for this warp
 //! ```
 
 use crate::level::block::{Block, Connection, Door, Level, MAX_BLOCKS, Opening};
@@ -36,36 +36,36 @@ pub const LEVEL_VERSION: u32 = 1;
 
 const FORMAT: &str = "mrt-level";
 
-/// Bytes of text that [`Level::from_text`] accepts: a block takes under 1,000.
+/// Most bytes of text that [`Level::from_text`] accepts: a block takes under 1,000.
 pub const MAX_TEXT_BYTES: usize = MAX_BLOCKS * 1_000;
 
 /// Why text is not a level.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LevelTextError {
-    /// Longer than [`MAX_TEXT_BYTES`].
+    /// The text is longer than [`MAX_TEXT_BYTES`].
     #[error("the level text has {found} bytes; expected at most {expected}")]
     TooLong {
-        /// Most accepted.
+        /// Most bytes accepted.
         expected: usize,
-        /// Length of the text.
+        /// Bytes of the text.
         found: usize,
     },
-    /// Not TOML, or a key is missing, unknown or of the wrong type.
+    /// The text is not TOML, or a key is missing, unknown or of the wrong type.
     #[error("the level text is malformed: {0}")]
     Malformed(String),
-    /// Some other file.
+    /// The text describes something other than a level.
     #[error("the level text has format `{found}`; expected `{FORMAT}`")]
     NotALevel {
-        /// What `format` says.
+        /// Value of the key `format`.
         found: String,
     },
-    /// From another release.
+    /// The text has a version that this release does not read.
     #[error("the level text has version {found}; this release reads version {LEVEL_VERSION}")]
     UnsupportedVersion {
-        /// What `version` says.
+        /// Value of the key `version`.
         found: u32,
     },
-    /// No such shape.
+    /// A block names a shape that does not exist.
     #[error("block {block}: shape `{found}`; expected one of {expected}")]
     UnknownShape {
         /// Which block.
@@ -75,7 +75,7 @@ pub enum LevelTextError {
         /// The name given.
         found: String,
     },
-    /// Not one of the 24 rotations.
+    /// A block has an orientation that is not one of the 24 rotations.
     #[error(
         "block {block}: orientation `{found}`; expected two perpendicular directions such as `+x+y`"
     )]
@@ -85,7 +85,7 @@ pub enum LevelTextError {
         /// The text given.
         found: String,
     },
-    /// None or several of `cell`, `box`, `corners`.
+    /// A block has none or several of `cell`, `box` and `corners`.
     #[error("block {block}: {found} of `cell`, `box` and `corners` given; expected exactly one")]
     Placement {
         /// Which block.
@@ -93,7 +93,7 @@ pub enum LevelTextError {
         /// How many were given.
         found: usize,
     },
-    /// Not a way to transport light in a warped block.
+    /// A block names a transport that does not exist.
     #[error(
         "block {block}: transport `{found}`; expected one of {}",
         WarpTransport::ALL.map(WarpTransport::name).join(", ")
@@ -104,7 +104,7 @@ pub enum LevelTextError {
         /// The text given.
         found: String,
     },
-    /// Not a face.
+    /// A name is not that of a face.
     #[error("{place}: face `{found}`; expected -x, +x, -y, +y, -z or +z")]
     UnknownFace {
         /// Which block or connection.
@@ -112,7 +112,7 @@ pub enum LevelTextError {
         /// The text given.
         found: String,
     },
-    /// Readable, but not a consistent level.
+    /// The text is readable, but the level in it is refused.
     #[error(transparent)]
     Level(#[from] LevelError),
 }
@@ -160,10 +160,10 @@ struct BlockText {
 }
 
 impl Level {
-    /// Reads and checks a level.
+    /// Reads a level from TOML and checks it.
     ///
     /// # Errors
-    /// [`LevelTextError`], with the place in the text where the parser knows it.
+    /// [`LevelTextError`]; with the line of the text where the parser knows it.
     pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
         if text.len() > MAX_TEXT_BYTES {
             return Err(LevelTextError::TooLong {
@@ -172,7 +172,7 @@ impl Level {
             });
         }
         let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
-        // Format and version first, whatever keys another version has.
+        // Format and version come first: another version may have keys that this one does not know.
         let header: Header = toml::from_str(text).map_err(malformed)?;
         if header.format != FORMAT {
             return Err(LevelTextError::NotALevel {
@@ -220,10 +220,10 @@ impl Level {
         Ok(level)
     }
 
-    /// Writes a level; [`Level::from_text`] gives the same level back, to the last bit.
+    /// Writes a level as TOML; [`Level::from_text`] returns the same level, to the last bit.
     ///
     /// # Errors
-    /// [`LevelTextError::Malformed`] if a value has no form in TOML.
+    /// [`LevelTextError::Malformed`], if TOML cannot represent a value.
     pub fn to_text(&self) -> Result<String, LevelTextError> {
         let text = LevelText {
             format: FORMAT.to_owned(),
@@ -247,7 +247,7 @@ impl Level {
     }
 }
 
-/// The parser's message with its place, without the excerpt that it draws over several lines.
+/// The parser's message with its line number, without the excerpt of several lines that the parser adds.
 fn one_line(text: &str, error: &toml::de::Error) -> String {
     let message = error.message().trim().replace('\n', "; ");
     match error.span().and_then(|span| text.get(..span.start)) {
@@ -318,7 +318,7 @@ fn write_block(block: &Block) -> BlockText {
     let (min, max) = block.warp.bounds();
     let is_cuboid = Hexahedron::cuboid(min, max) == block.warp;
     let is_cell = is_cuboid && max == min + DVec3::ONE;
-    // The commonest albedo is the block's; the others are named.
+    // The most frequent albedo becomes the block's; faces with another one are named.
     let uses = |albedo: &Vec3| block.albedo.iter().filter(|&a| a == albedo).count();
     let common = block
         .albedo

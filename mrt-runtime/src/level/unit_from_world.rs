@@ -1,18 +1,18 @@
-//! From the world to the unit cube of a block.
+//! The map from the world to the unit cube of a block.
 
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// From the world to the unit cube of a block.
+/// The map from the world to the unit cube of a block: the inverse of a warp.
 #[derive(Clone, Copy, Debug)]
 pub struct UnitFromWorld {
     warp: Hexahedron,
-    /// Matrix and origin, if the warp is affine: one product, where Newton's method takes microseconds.
+    /// Inverse matrix and origin, if the warp is affine: one product takes nanoseconds, Newton's method microseconds.
     affine: Option<(DMat3, DVec3)>,
 }
 
-/// Corners this near to those of an affine map, in diagonals of the block, are its corners: a hundred roundings of
-/// coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT).
+/// Distance, in diagonals of the block, within which the corners of a warp count as those of an affine map: a hundred
+/// roundings of coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT).
 const AFFINE_TOLERANCE: f64 = 1e-10;
 
 impl UnitFromWorld {
@@ -30,7 +30,8 @@ impl UnitFromWorld {
         }
     }
 
-    /// The point of the unit cube, or beside it; its middle for points too far from a warped block.
+    /// The point of the unit cube, or outside it, that the warp takes to `world`, metres. Where Newton's method does
+    /// not find one, far from a warped block, the middle of the cube.
     pub fn point(&self, world: DVec3) -> DVec3 {
         match self.affine {
             Some((inverse, origin)) => inverse * (world - origin),

@@ -1,5 +1,4 @@
-//! Where the walls of a shape are: flat faces of the cube, or the charts of a round tube (Loos et al. 2011,
-//! section 6.1).
+//! The walls of a shape: flat faces of the cube, or the charts of a round tube (Loos et al. 2011, section 6.1).
 
 use crate::level::shape::Shape;
 use crate::level::wall_point::WallPoint;
@@ -7,7 +6,8 @@ use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 
 impl Shape {
-    /// The point at (u, v) in [0, 1]² of a wall; the charts of a tube go on beyond [0, 1] in v, around it.
+    /// The point at (u, v) in [0, 1]² of a wall. For a tube, v may be outside [0, 1]: the chart continues around the
+    /// tube.
     pub fn wall_point(&self, wall: Face, u: f64, v: f64) -> WallPoint {
         match self.tube() {
             None => WallPoint {
@@ -24,13 +24,13 @@ impl Shape {
         }
     }
 
-    /// Index within its wall of the texel at (u, v) of the wall.
+    /// Index, within a wall, of the texel at (u, v) in [0, 1]²; other values count as the nearest edge.
     pub fn texel_of_uv(resolution: usize, u: f64, v: f64) -> usize {
         let index = |x: f64| ((x * resolution as f64) as usize).min(resolution - 1);
         index(v) * resolution + index(u)
     }
 
-    /// Area of each texel over that of a cube's; empty for cubes, where all are 1.
+    /// Area of each texel divided by the area of a cube's texel; empty for cubes, where all are 1.
     pub fn relative_texel_areas(&self, resolution: usize) -> Vec<f32> {
         let Some(form) = self.tube() else {
             return Vec::new();
@@ -42,7 +42,8 @@ impl Shape {
             .collect()
     }
 
-    /// True when a point of the unit cube is inside the walls, or outside a round one by at most `tolerance`.
+    /// True when a point of the unit cube is inside the walls; points outside a round wall by at most `tolerance` block
+    /// widths count as inside.
     pub fn is_inside_walls(&self, unit: DVec3, tolerance: f64) -> bool {
         self.tube()
             .is_none_or(|form| form.wall_distance(unit) >= -tolerance)

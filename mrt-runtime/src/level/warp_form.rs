@@ -1,23 +1,22 @@
-//! The form of a block: its warp without place, size and orientation. Operators of warped blocks are shared by
-//! form.
+//! The form of a block: its warp without place, size and orientation. Warped blocks of one form share their operators.
 
 use crate::level::block::Block;
 use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// Corners of a warp from the canonical cube, in the order of [`Hexahedron`]; see [`form_of`].
+/// The eight corners of a form, in the order of [`Hexahedron`]; see [`form_of`].
 pub type WarpForm = [[f32; 3]; 8];
 
-/// Coordinates of two forms that are the same differ by less than this, in diagonals of the block. Levels name
-/// corners in decimal and far from the origin, good to 1e-6 of a block; a texel at 16² is forty times as wide
-/// as this.
+/// Two forms are the same if their coordinates differ by less than this, in diagonals of the block. Levels give corners
+/// as decimal numbers, perhaps far from the origin, which are good to 1e-6 of a block; a texel at 16² is forty times as
+/// wide as this tolerance.
 pub const FORM_TOLERANCE: f32 = 1e-3;
 
-/// The form of a block: the corners that the canonical cube's go to, turned back by the block's orientation, less
-/// the first one, over the length of the diagonal of their bounds.
+/// The form of a block. Its corners are the images of the canonical cube's corners, turned back by the block's
+/// orientation, minus the first of them, divided by the length of the diagonal of their bounds.
 ///
-/// A cube has the same form in all of its 24 orientations, and so has every other box. A block that stands at
-/// another angle has a form of its own, since its probes have the level's axes.
+/// A cube has the same form in all of its 24 orientations, and so has every other box. A block at another angle to the
+/// level's axes has another form, since its probes have those axes.
 pub fn form_of(block: &Block) -> WarpForm {
     let warp = block.canonical_warp();
     let back = block.orientation.inverse();
@@ -35,7 +34,7 @@ pub fn same_form(a: &WarpForm, b: &WarpForm) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < FORM_TOLERANCE)
 }
 
-/// The form as a warp.
+/// The warp of the canonical cube that has a form.
 pub fn warp_of(form: &WarpForm) -> Hexahedron {
     Hexahedron {
         corners: form.map(|corner| DVec3::from_array(corner.map(f64::from))),

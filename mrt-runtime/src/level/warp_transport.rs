@@ -1,19 +1,19 @@
-//! Whose operators a warped block uses.
+//! Which operators light a warped block.
 
-/// Which transport a warped block uses.
+/// Which operators light a warped block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum WarpTransport {
-    /// The canonical shape's, as it is.
+    /// Operators of the canonical shape, unchanged.
     #[default]
     Canonical,
-    /// Coefficients of the canonical shape, whose light is gathered anew on the warped walls.
+    /// Coefficients of the canonical shape; their light is gathered anew on the warped walls.
     Regathered,
-    /// Everything computed for the warped shape.
+    /// All operators computed for the warped shape.
     Rebuilt,
 }
 
 impl WarpTransport {
-    /// From the cheapest to the best.
+    /// All kinds, from the cheapest to the most accurate.
     pub const ALL: [WarpTransport; 3] = [
         WarpTransport::Canonical,
         WarpTransport::Regathered,
@@ -29,7 +29,7 @@ impl WarpTransport {
         }
     }
 
-    /// Inverse of [`WarpTransport::name`].
+    /// The kind with that [`name`](WarpTransport::name); `None` if there is none.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|level| level.name() == name)
     }

@@ -1,9 +1,10 @@
 //! Where a light's direct light goes: beams through the level's openings, followed outwards from the light.
 //!
-//! A beam is a light seen through one sequence of openings. Seen from the light, what an opening lets through is a
-//! cone with the opening's edges for its sides, and what a sequence lets through is the intersection of its cones:
-//! Luebke and Georges, "Portals and mirrors", I3D 1995, with exact polygons in place of their rectangles. The sign
-//! conditions are those of [`Openings`](crate::light::visibility::Openings), which asks from the receiver's end.
+//! A beam is a light seen through one sequence of openings. An opening lets a cone of light through, whose sides are
+//! the planes of the light and the opening's edges. A sequence of openings lets the intersection of their cones
+//! through: Luebke and Georges, "Portals and mirrors", I3D 1995, with exact polygons in place of their rectangles. The
+//! sign conditions are those of [`Openings`](crate::light::visibility::Openings), which tests the same from the
+//! receiver's end.
 //!
 //! The cones of different sequences do not overlap, so a block's direct light is the sum over its beams.
 
@@ -13,41 +14,41 @@ use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedBlock, PlacedLevel};
 use crate::light::placed::PlacedLight;
 
-use cone::{Cone, MAX_PLANES, ON_PLANE, Scratch, Source, narrowed};
+use cone::{Cone, MAX_PLANES, ON_PLANE, Passing, Scratch, Source};
 use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::TubeForm;
 
-/// Beams that wait to be followed, at most. One waits for each opening that was passed by on the way, so a straight
-/// corridor of any length needs one; a beam that enters an open hall of 300 x 300 blocks needs a few hundred.
+/// Most beams that wait to be followed further. One waits for each opening beside the path of the beam that is
+/// followed: a straight corridor of any length needs one, an open hall of 300 x 300 blocks a few hundred.
 const MAX_PENDING: usize = 1024;
 
 /// A light's direct light in a block, through one sequence of openings.
 #[derive(Clone, Copy, Debug)]
 pub struct Beam {
-    /// The block that it lights.
+    /// The block that the beam lights.
     pub block: BlockIndex,
-    /// The light's index, as given to [`BeamTracer::trace`].
+    /// Index of the light, as given to [`BeamTracer::trace`].
     pub light: u32,
-    /// Product of the values of the doors on the way, in (0, 1].
+    /// Fraction of light, in (0, 1], that the doors on the way let through: the product of their values.
     pub fraction: f32,
-    /// Where the planes have their origin, metres: the light, or a point of the block for directional lights.
-    /// Differences from it keep their digits far from the world's origin.
+    /// Origin of the planes, metres: the light, or a corner of the block for directional lights. Far from the world's
+    /// origin, differences from it keep more digits than positions do.
     pub origin: Vec3,
     /// Only the first `plane_count` entries are valid.
     planes: [[f32; 4]; MAX_PLANES],
     plane_count: u32,
-    /// True if planes do not tell which points are lit: a bend or too many planes are on the way. The light's
-    /// irradiance in this block is then that of [`add_exact`](crate::light::direct_light::add_exact), which takes the
-    /// place of all beams of this light in this block.
+    /// True if the planes do not tell which points are lit, because of a bend or too many planes on the way. All of the
+    /// light's beams in this block are then replaced by [`add_exact`](crate::light::direct_light::add_exact).
     pub exact: bool,
 }
 
 impl Beam {
-    /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for
-    /// all. Planes that the whole block is inside of are left out.
+    /// `[x, y, z, w]` of each plane: a point p of the block is lit if `(p - origin) · xyz + w >= 0`, metres, for all
+    /// planes. Planes that the whole block is inside of are left out.
     ///
-    /// In `f32`, with w added last, points in the plane where two beams of a light meet are in exactly one.
+    /// Evaluated in `f32` with w added last, a point in the plane where two beams of a light meet is in exactly one of
+    /// them.
     pub fn planes(&self) -> &[[f32; 4]] {
         &self.planes[..self.plane_count as usize]
     }
@@ -61,22 +62,22 @@ impl PartialEq for Beam {
     }
 }
 
-/// Follows lights through the openings of one level. Made once; tracing allocates nothing.
+/// Follows lights through the openings of one level. Make it once; tracing allocates nothing.
 #[derive(Debug)]
 pub struct BeamTracer {
-    /// Openings that lead outside: the block, and which of its portals.
+    /// Openings that lead outside: the block, and the position in its list of portals.
     outside: Vec<(BlockIndex, u32)>,
-    /// Beams to be followed further: the first [`BeamTracer::waiting`]. The others are kept for their memory.
+    /// Beams to follow further. Only the first `waiting` entries are valid; the others keep their memory for later.
     pending: Vec<Node>,
     waiting: usize,
-    /// The one that is followed, what becomes of it beyond an opening, and its light there.
+    /// The beam that is being followed, that beam beyond the present opening, and its light in the block there.
     node: Node,
     next: Node,
     beam: Beam,
     scratch: Scratch,
-    /// For each block, the trace that last gave it an exact beam.
+    /// For each block, the number of the trace that last gave it an exact beam.
     exact: Vec<u32>,
-    /// Number of the trace that runs.
+    /// Number of the present trace.
     trace: u32,
 }
 
@@ -100,7 +101,7 @@ impl Node {
         cone: Cone::EVERYWHERE,
     };
 
-    /// Takes over another, without the planes that it does not use.
+    /// Same as a clone of `other`, but copies only the planes in use.
     fn copy_from(&mut self, other: &Node) {
         (self.block, self.entered) = (other.block, other.entered);
         (self.depth, self.fraction) = (other.depth, other.fraction);
@@ -108,7 +109,7 @@ impl Node {
     }
 }
 
-/// What one trace works on.
+/// The input and output of one trace.
 struct Trace<'a> {
     level: &'a PlacedLevel,
     doors: &'a [f32],
@@ -119,14 +120,21 @@ struct Trace<'a> {
     emit: &'a mut dyn FnMut(&Beam),
 }
 
+impl Trace<'_> {
+    /// Fraction of light that passes the door in a face; 1 without a door.
+    fn door_value(&self, block: &PlacedBlock, face: Face) -> f32 {
+        block.doors[face.index()].map_or(1.0, |door| self.doors[door as usize])
+    }
+}
+
 impl BeamTracer {
-    /// Finds the level's openings to the outside, and allocates what tracing needs: 0.6 kB for each of up to 1024
+    /// Finds the level's openings to the outside, and allocates the memory of tracing: 0.6 kB for each of up to 1024
     /// beams, fewer in small scenes.
     pub fn new(level: &PlacedLevel) -> Self {
         let openings = level.blocks.iter().map(|block| block.portals.len()).sum();
         let mut tracer = Self {
             outside: Vec::with_capacity(openings),
-            // A cube has five openings besides the one entered, and the light's block six.
+            // A cube has five openings besides the one that the beam entered by, and the light's block has six.
             pending: Vec::with_capacity(MAX_PENDING.min(5 * level.blocks.len() + 1)),
             waiting: 0,
             node: Node::NEW,
@@ -148,7 +156,7 @@ impl BeamTracer {
         tracer
     }
 
-    /// Goes on with another level of as many blocks and openings; allocates nothing.
+    /// Switches to another level with the same numbers of blocks and openings; allocates nothing.
     pub(crate) fn restart(&mut self, level: &PlacedLevel) {
         self.outside.clear();
         for (index, block) in level.blocks.iter().enumerate() {
@@ -160,16 +168,18 @@ impl BeamTracer {
         }
     }
 
-    /// Calls `emit` for each beam of a light, `light` being the index that beams name it by.
+    /// Calls `emit` for each beam of a light; beams name it by the index `light`.
     ///
-    /// An [exact](Beam::exact) beam comes at most once a block. It may come after other beams of its block, which it
-    /// replaces; none comes after it. Lights without intensity have no beams; light beyond closed doors has none.
+    /// Each block gets at most one [exact](Beam::exact) beam. It may come after other beams of its block, which it
+    /// replaces; no beam of the block comes after it. A light without intensity has no beams, and closed doors let no
+    /// beam through.
     ///
-    /// Cost: half a microsecond for each block that a beam enters, and a test for each opening to the outside if the
-    /// light is directional.
+    /// Cost: half a microsecond for each block that a beam enters; for a directional light, also a test of each opening
+    /// to the outside.
     ///
     /// # Panics
-    /// If the level is another than the tracer's, or `doors` are not as many as its doors.
+    /// If the level has another number of blocks than the tracer's, or `doors` has another length than the level's
+    /// doors.
     pub fn trace(
         &mut self,
         level: &PlacedLevel,
@@ -229,27 +239,29 @@ impl BeamTracer {
         {
             return;
         }
-        let fraction = match block.doors[portal.face.index()] {
-            Some(door) => trace.doors[door as usize],
-            None => 1.0,
-        };
+        let fraction = trace.door_value(block, portal.face);
         let next = &mut self.next;
-        let (cone, scratch) = (&Cone::EVERYWHERE, &mut self.scratch);
-        if narrowed(cone, &trace.source, portal, 0, scratch, &mut next.cone) {
+        let passing = Passing {
+            cone: &Cone::EVERYWHERE,
+            source: &trace.source,
+            portal,
+            depth: 0,
+        };
+        if passing.narrow(&mut self.scratch, &mut next.cone) {
             (next.block, next.entered) = (index, Some(portal.face));
             (next.depth, next.fraction) = (1, fraction);
             self.enter(trace);
         }
     }
 
-    /// Follows everything that is pending.
+    /// Follows all pending beams to their ends.
     fn follow(&mut self, trace: &mut Trace<'_>) {
         let level = trace.level;
         while self.waiting > 0 {
             self.waiting -= 1;
             self.node.copy_from(&self.pending[self.waiting]);
             let block = &level.blocks[self.node.block.get()];
-            // As far as a line that enters each block at most once can get.
+            // A line enters each block at most once, so this is as far as it can get.
             if self.node.depth as usize + 1
                 >= level.blocks.len() + usize::from(trace.home.is_none())
             {
@@ -266,12 +278,8 @@ impl BeamTracer {
                 if Some(portal.face) == node.entered || Some(next) == trace.home {
                     continue;
                 }
-                let value = match block.doors[portal.face.index()] {
-                    Some(door) => trace.doors[door as usize],
-                    None => 1.0,
-                };
-                let fraction = node.fraction * value;
-                // The far side's outline is the one that receivers beyond it ask.
+                let fraction = node.fraction * trace.door_value(block, portal.face);
+                // Receivers beyond the opening test the outline that their own block gives it.
                 let beyond = level.blocks[next.get()]
                     .portals
                     .iter()
@@ -279,18 +287,23 @@ impl BeamTracer {
                 let Some(beyond) = beyond.filter(|_| fraction > 0.0) else {
                     continue;
                 };
-                let (source, depth, scratch) = (&trace.source, node.depth, &mut self.scratch);
                 let to = &mut self.next;
-                if narrowed(&node.cone, source, beyond, depth, scratch, &mut to.cone) {
+                let passing = Passing {
+                    cone: &node.cone,
+                    source: &trace.source,
+                    portal: beyond,
+                    depth: node.depth,
+                };
+                if passing.narrow(&mut self.scratch, &mut to.cone) {
                     (to.block, to.entered) = (next, Some(face));
-                    (to.depth, to.fraction) = (depth + 1, fraction);
+                    (to.depth, to.fraction) = (node.depth + 1, fraction);
                     self.enter(trace);
                 }
             }
         }
     }
 
-    /// Emits the beam of the block that light has entered, and leaves it pending.
+    /// Emits the beam in `next` for the block that it has entered, and makes it pending.
     fn enter(&mut self, trace: &mut Trace<'_>) {
         let node = &mut self.next;
         if node.fraction <= 0.0 {
@@ -300,7 +313,7 @@ impl BeamTracer {
         if trace.source.misses(block) || !beam_in(block, &trace.source, node, &mut self.beam) {
             return;
         }
-        // Light that has crossed a bend, or part of one, is not in a cone.
+        // Light that has crossed a bend, or part of one, does not fill a cone.
         if block.shape.tube() == Some(TubeForm::Bend) {
             node.cone.is_exact = false;
             self.beam.exact = true;
@@ -314,7 +327,8 @@ impl BeamTracer {
             self.pending.push(self.next.clone());
             self.waiting += 1;
         } else {
-            // More than fits is yet to be lit, and receivers find out by themselves what is.
+            // There is no room to find the other beams. Exact beams let the receivers of every block test their light
+            // themselves.
             self.waiting = 0;
             for block in 0..trace.level.blocks.len() {
                 self.beam.block = BlockIndex::new(block);
@@ -324,6 +338,7 @@ impl BeamTracer {
         }
     }
 
+    /// Emits a beam unless its block has an exact beam of this trace.
     fn give(&mut self, trace: &mut Trace<'_>) {
         let beam = &self.beam;
         let mark = &mut self.exact[beam.block.get()];
@@ -336,10 +351,10 @@ impl BeamTracer {
     }
 }
 
-/// Makes `beam` that of a light in a block, less the planes that the whole block is inside of; false if it is outside of
-/// one. Which light's it is, is left alone.
+/// Sets all of `beam` but its light: the light of `node` in a block, without the planes that the whole block is inside
+/// of. False if the block is outside a plane.
 ///
-/// The image of a trilinear map is in the hull of its corners, and so is a tube in its cube.
+/// Only the corners of the block are tested: a warped block is in the hull of its corners, and a tube is in its cube.
 fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -> bool {
     let origin = match source.toward {
         None => source.origin,
@@ -364,7 +379,8 @@ fn beam_in(block: &PlacedBlock, source: &Source, node: &Node, beam: &mut Beam) -
         if smallest < -slack {
             let n = plane.normal.as_vec3();
             let mut w = plane.at(shift) as f32;
-            // Two beams meet in a plane that each sees from its side, to the bit. A texel in it is in one of them.
+            // Two beams that meet have the same plane with opposite signs, to the bit. Rounding one of them down leaves
+            // each texel in the plane to exactly one beam.
             if n.to_array().into_iter().find(|&x| x != 0.0) < Some(0.0) {
                 w = w.next_down();
             }
@@ -410,7 +426,7 @@ mod tests {
     }
 
     #[test]
-    fn where_too_many_beams_wait_receivers_are_asked() {
+    fn every_block_gets_an_exact_beam_when_too_many_beams_wait() {
         let scene = room(5);
         let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));
         let mut tracer = BeamTracer::new(&scene.level);
@@ -424,7 +440,8 @@ mod tests {
 
     #[test]
     fn few_beams_wait_in_an_open_hall() {
-        // Along a path one beam waits for each window that was parted, and far windows are too narrow to part often.
+        // Along a path, one beam waits for each opening whose light was divided, and far openings are too narrow to be
+        // divided often.
         for width in [10, 40] {
             let scene = room(width);
             let light = lamp(&scene, Vec3::new(0.3, 0.5, 0.4));

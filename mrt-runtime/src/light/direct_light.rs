@@ -1,7 +1,7 @@
 //! Direct light at the texels: the first stage of a frame (Loos et al. 2011, section 7.3, step 1).
 //!
-//! [`irradiance`] is the reference, one point at a time and with any shadows; `add_beam` does a whole block with
-//! vector instructions.
+//! [`irradiance`] is the reference: one point at a time, with any shadows. `add_beam` lights a whole block with vector
+//! instructions.
 
 pub mod add_beam;
 
@@ -15,14 +15,14 @@ use crate::light::visibility::{Receiver, Toward, Visibility};
 use glam::{DVec3, Vec3};
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 
-/// What shadows depend on: where walls and openings are, how far doors are open, and who decides.
+/// What shadows depend on: walls and openings, doors, and the test of visibility.
 #[derive(Debug)]
 pub struct Shadows<'a, V> {
-    /// Blocks and openings.
+    /// Blocks and openings of the level.
     pub level: &'a PlacedLevel,
     /// Fraction of light that each door lets through.
     pub doors: &'a [f32],
-    /// Who decides.
+    /// Decides which part of a light reaches a point.
     pub visibility: &'a V,
 }
 
@@ -41,57 +41,16 @@ pub fn irradiance<V: Visibility>(
     receiver: Receiver,
     normal: DVec3,
 ) -> Vec3 {
-    let (toward, unshadowed) = match (placed.light, placed.block) {
-        (
-            Light::Directional {
-                direction,
-                irradiance,
-            },
-            _,
-        ) => {
-            let to_light = -direction.as_dvec3().normalize();
-            let cosine = normal.dot(to_light).max(0.0) as f32;
-            (Toward::Infinity(to_light), irradiance * cosine)
-        }
-        (
-            Light::Sphere {
-                position,
-                radius,
-                intensity,
-            },
-            Some(block),
-        ) => {
-            let position = position.as_dvec3();
-            let offset = position - receiver.position;
-            let factor = bounded_irradiance(offset, normal, radius);
-            (Toward::Point { position, block }, intensity * factor)
-        }
-        (
-            Light::Spot {
-                position,
-                radius,
-                intensity,
-                direction,
-                inner_angle,
-                outer_angle,
-            },
-            Some(block),
-        ) => {
-            let position = position.as_dvec3();
-            let offset = position - receiver.position;
-            let cone = cone_falloff(-offset, direction.as_dvec3(), inner_angle, outer_angle);
-            let factor = cone * bounded_irradiance(offset, normal, radius);
-            (Toward::Point { position, block }, intensity * factor)
-        }
-        // A light that is off.
-        _ => return Vec3::ZERO,
+    let Some((toward, unshadowed)) = unshadowed_irradiance(placed, receiver.position, normal)
+    else {
+        return Vec3::ZERO;
     };
     if unshadowed == Vec3::ZERO {
         return Vec3::ZERO;
     }
     let visibility = shadows.visibility;
     let fraction = visibility.fraction(shadows.level, shadows.doors, receiver, toward);
-    // Callers' functions may return anything: what is not a positive number lets no light through.
+    // A caller's function may return any number: NaN and negative numbers let no light through.
     if fraction > 0.0 {
         unshadowed * fraction.min(1.0)
     } else {
@@ -99,10 +58,45 @@ pub fn irradiance<V: Visibility>(
     }
 }
 
-/// Adds one light's irradiance in a block, asking for the shadow of each texel by itself: what an
-/// [exact](crate::light::beam::Beam::exact) beam asks for.
+/// The way to a light from a point, and the light's irradiance there without shadows; `None` for a light that is off.
+fn unshadowed_irradiance(
+    placed: &PlacedLight,
+    point: DVec3,
+    normal: DVec3,
+) -> Option<(Toward, Vec3)> {
+    let (position, radius, intensity) = match placed.light {
+        Light::Directional {
+            direction,
+            irradiance,
+        } => {
+            let to_light = -direction.as_dvec3().normalize();
+            let cosine = normal.dot(to_light).max(0.0) as f32;
+            return Some((Toward::Infinity(to_light), irradiance * cosine));
+        }
+        #[rustfmt::skip]
+        Light::Sphere { position, radius, intensity }
+        | Light::Spot { position, radius, intensity, .. } => (position.as_dvec3(), radius, intensity),
+    };
+    let block = placed.block?;
+    let offset = position - point;
+    let factor = match placed.light {
+        Light::Spot {
+            direction,
+            inner_angle,
+            outer_angle,
+            ..
+        } => cone_falloff(-offset, direction.as_dvec3(), inner_angle, outer_angle),
+        _ => 1.0,
+    };
+    let factor = factor * bounded_irradiance(offset, normal, radius);
+    Some((Toward::Point { position, block }, intensity * factor))
+}
+
+/// Adds the irradiance of one light in a block, with a test of shadow for each texel. For blocks with an
+/// [exact](crate::light::beam::Beam::exact) beam.
 ///
-/// `out` has red, green and blue, one value a slot, as long as the texels' slices. Cost: up to microseconds a texel.
+/// `out` has red, green and blue, one value for each slot, as long as the slices of `texels`. Cost: up to microseconds
+/// a texel.
 ///
 /// # Panics
 /// If the slices differ in length.
@@ -131,13 +125,14 @@ pub fn add_exact<V: Visibility>(
     }
 }
 
+/// Irradiance per intensity of a sphere light whose radius is at least [`MIN_RADIUS`].
 fn bounded_irradiance(offset: DVec3, normal: DVec3, radius: f32) -> f32 {
     sphere_light_irradiance(offset, normal, f64::from(radius).max(MIN_RADIUS)) as f32
 }
 
-/// 1 within the inner angle, 0 beyond the outer one, smooth between.
+/// 1 within the inner angle from the axis, 0 beyond the outer angle, smooth between.
 fn cone_falloff(from_light: DVec3, axis: DVec3, inner: f32, outer: f32) -> f32 {
-    // A receiver at the light's centre is in no direction from it, and gets no light anyway.
+    // A receiver at the light's centre has no direction from it, and gets no light anyway.
     if from_light == DVec3::ZERO {
         return 0.0;
     }

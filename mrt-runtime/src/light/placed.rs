@@ -1,11 +1,11 @@
-//! A light in the block that it stands in.
+//! A light together with the block that contains it.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::PlacedLevel;
 use crate::light::source::{Light, LightError};
 use glam::Vec3;
 
-/// A light whose values have been checked, and the block that it stands in. Made by [`place`].
+/// A light whose values have been checked, and the block that contains it. Made by [`place`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacedLight {
     pub(crate) light: Light,
@@ -14,17 +14,17 @@ pub struct PlacedLight {
 }
 
 impl PlacedLight {
-    /// A light that lights nothing: the place of one that was removed or is skipped.
+    /// A light that is off. It stands for a light that was removed or is skipped.
     pub(crate) const OFF: Self = Self {
         light: Light::sphere(Vec3::ZERO, 0.0, Vec3::ZERO),
         block: None,
     };
 }
 
-/// Checks a light and finds its block. Cost: independent of the number of blocks.
+/// Checks the values of a light and finds its block. Cost: independent of the number of blocks.
 ///
 /// # Errors
-/// [`LightError`].
+/// [`LightError`], if a value is out of range or the light is in no block.
 pub fn place(level: &PlacedLevel, light: Light) -> Result<PlacedLight, LightError> {
     light.check()?;
     let position = match light {

@@ -1,4 +1,4 @@
-//! Lights that a game sets, and why one is refused.
+//! The lights of a game, and why a frame skips one.
 
 use crate::level::block_index::BlockIndex;
 use crate::light::limits::{MAX_LIGHT_VALUE, MAX_LIGHTS};
@@ -15,7 +15,7 @@ pub enum Light {
     Sphere {
         /// Centre, metres.
         position: Vec3,
-        /// Metres, at least 0.
+        /// Radius, metres, at least 0.
         radius: f32,
         /// Radiant intensity per colour channel, W/sr.
         intensity: Vec3,
@@ -24,20 +24,20 @@ pub enum Light {
     Spot {
         /// Centre, metres.
         position: Vec3,
-        /// Metres, at least 0.
+        /// Radius, metres, at least 0.
         radius: f32,
         /// Radiant intensity on the axis per colour channel, W/sr.
         intensity: Vec3,
-        /// Along the axis, away from the light; need not be of unit length.
+        /// Direction of the axis, away from the light; need not be of unit length.
         direction: Vec3,
-        /// Full intensity within this angle from the axis, radians.
+        /// Angle from the axis, radians, within which the intensity is full.
         inner_angle: f32,
-        /// No light beyond this angle, radians, from the inner angle to π.
+        /// Angle from the axis, radians, beyond which there is no light; from the inner angle to π.
         outer_angle: f32,
     },
     /// Parallel light that enters through openings that lead outside.
     Directional {
-        /// In which the light travels; need not be of unit length.
+        /// Direction in which the light travels; need not be of unit length.
         direction: Vec3,
         /// Irradiance on a surface that faces the light, per colour channel, W/m².
         irradiance: Vec3,
@@ -54,8 +54,8 @@ impl Light {
         }
     }
 
-    /// A sphere that shines along `direction`: fully within the first angle of `cone` from the axis, not at all beyond
-    /// the second, radians. See [`Light::Spot`] for the other units.
+    /// A sphere that shines along `direction`. `cone` has the inner and the outer angle, radians. See [`Light::Spot`]
+    /// for the meaning and units of all values.
     pub const fn spot(
         position: Vec3,
         radius: f32,
@@ -81,7 +81,7 @@ impl Light {
         }
     }
 
-    /// Checks every value of the light, wherever it stands.
+    /// Checks every value of the light, but not whether it is in a block.
     pub(crate) fn check(&self) -> Result<(), LightError> {
         let number = |what, value: f32, low, high| {
             if (low..=high).contains(&value) {
@@ -141,10 +141,10 @@ impl Light {
     }
 }
 
-/// Why a frame skips a light. The other lights of the frame shine all the same.
+/// Why a frame skips a light. Its other lights shine nevertheless.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LightError {
-    /// A value is NaN, infinite, negative where it must not be, or absurdly large.
+    /// A value is NaN, infinite, too large, or negative where it must not be.
     #[error("{what} is {found}; expected a number in [{low}, {high}]")]
     OutOfRange {
         /// Which property.
@@ -156,19 +156,19 @@ pub enum LightError {
         /// The value given.
         found: f32,
     },
-    /// A direction of no length.
+    /// A direction has length 0.
     #[error("direction is {found}; expected a vector that is not zero")]
     NoDirection {
         /// The vector given.
         found: Vec3,
     },
-    /// The light stands in a wall, or outside the level.
+    /// The light is in a wall or outside the level.
     #[error("position {found} m lies in no block; expected a point inside the level")]
     OutsideBlocks {
         /// The position given.
         found: Vec3,
     },
-    /// The light stands in the cube of a tube, outside the tube's wall.
+    /// The light is in the cube of a tube, but outside the round wall.
     #[error(
         "position {found} m lies in the cube of block {block}, outside the round wall of its tube; expected a point \
          inside the tube"
@@ -179,7 +179,7 @@ pub enum LightError {
         /// The position given.
         found: Vec3,
     },
-    /// The frame has [`MAX_LIGHTS`] others already.
+    /// The frame has [`MAX_LIGHTS`] other lights already.
     #[error("the frame has {MAX_LIGHTS} other lights; expected at most {MAX_LIGHTS} in all")]
     TooMany,
 }

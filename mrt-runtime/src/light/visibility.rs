@@ -1,37 +1,37 @@
-//! Shadows of direct light: by the level's openings, or by rays of the caller's.
+//! Shadows of direct light: by the level's openings, or by the caller's rays.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedBlock, PlacedLevel, Portal};
 use glam::DVec3;
 use mrt_core::geometry::tube::TubeForm;
 
-/// A surface point that asks for light.
+/// A surface point whose light is computed.
 #[derive(Clone, Copy, Debug)]
 pub struct Receiver {
-    /// The block that it belongs to.
+    /// The block whose wall it is on.
     pub block: BlockIndex,
     /// World position, metres.
     pub position: DVec3,
 }
 
-/// Where the light comes from.
+/// Where a receiver's light comes from.
 #[derive(Clone, Copy, Debug)]
 pub enum Toward {
     /// A light at a point of a block.
     Point {
         /// World position, metres.
         position: DVec3,
-        /// The block that it stands in.
+        /// The block that contains the light.
         block: BlockIndex,
     },
     /// A light at infinity; the unit vector points to it.
     Infinity(DVec3),
 }
 
-/// Decides what part of a light reaches a point.
+/// Decides which part of a light reaches a point.
 pub trait Visibility: Sync {
-    /// Fraction in [0, 1] of the light that arrives, with the value of each of [`PlacedLevel::doors`]; what is more
-    /// counts as 1, NaN as 0.
+    /// Fraction in [0, 1] of the light that arrives. Larger values count as 1, negative ones and NaN as 0. `doors` has
+    /// the present value of each of [`PlacedLevel::doors`].
     fn fraction(
         &self,
         level: &PlacedLevel,
@@ -40,20 +40,20 @@ pub trait Visibility: Sync {
         toward: Toward,
     ) -> f32;
 
-    /// Another number whenever answers may differ from those before: with the same one, frames keep what they know.
-    /// `None`, the default, makes them ask for every block in every frame.
+    /// A version of the answers: change it whenever they may differ from earlier ones. While it stays the same, frames
+    /// keep direct light that nothing else changed. With `None`, the default, every frame asks again for every block.
     fn version(&self) -> Option<u64> {
         None
     }
 
-    /// True for [`Openings`], whose answers frames get faster without asking.
+    /// True for [`Openings`], whose shadows frames compute faster without calling [`Visibility::fraction`].
     #[doc(hidden)]
     fn is_by_openings(&self) -> bool {
         false
     }
 }
 
-/// Light goes where the level's openings let it.
+/// Light passes the level's openings, and nothing else.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Openings;
 
@@ -77,15 +77,15 @@ impl Visibility for Openings {
     }
 }
 
-/// Light goes where the caller's function says, such as a ray cast into the real mesh.
+/// The caller's function decides where light passes, such as a ray cast into the real mesh.
 ///
-/// The function gets the receiver's position and the light's, both in metres, the latter pushed
-/// [`RAY_REACH`] away for lights at infinity, and returns the fraction in [0, 1] that arrives. Light still
-/// crosses walls of blocks only where the function lets it: neither openings nor doors are asked.
+/// The function gets the positions of the receiver and the light, metres, and returns the fraction in [0, 1] that
+/// arrives. A light at infinity is put [`RAY_REACH`] away from the receiver. Openings and doors play no part: only the
+/// function keeps light from crossing the walls of blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct Rays<F>(pub F);
 
-/// Distance, metres, at which [`Rays`] puts lights at infinity.
+/// Distance, metres, at which [`Rays`] puts a light at infinity.
 pub const RAY_REACH: f64 = 1e6;
 
 impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
@@ -98,13 +98,14 @@ impl<F: Fn(DVec3, DVec3) -> f32 + Sync> Visibility for Rays<F> {
     }
 }
 
-/// [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that moves now and then.
-/// With [`FrameConfig::slice`](crate::modular::frame::config::FrameConfig), the rays of a change are spread over frames.
+/// A [`Visibility`] whose answers stay the same while `version` does, such as rays into a mesh that changes now and
+/// then. With [`FrameConfig::slice`](crate::modular::frame::config::FrameConfig), the rays after a change are spread
+/// over several frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Versioned<V> {
-    /// Who is asked.
+    /// Decides which part of a light reaches a point.
     pub visibility: V,
-    /// To be changed whenever answers may change.
+    /// Change it whenever the answers of `visibility` may differ from earlier ones.
     pub version: u64,
 }
 
@@ -124,14 +125,14 @@ impl<V: Visibility> Visibility for Versioned<V> {
     }
 }
 
-/// Follows the segment from the receiver through connected openings until it is in the light's
-/// block, or outside for lights at infinity; the product of the doors' values on the way.
+/// Follows the segment from the receiver to the light through connected openings, into the light's block, or to the
+/// outside for a light at infinity. Returns the product of the values of the doors on the way, or 0 if a wall is in the
+/// way.
 ///
-/// Inside a cube or a straight tube nothing is in the way: they count as convex, as they are unless faces are
-/// bent. In a bend the part of the segment between its openings is tested in the canonical frame, where it is
-/// straight if the warp is affine; for other warps its ends are exact. A line
-/// that leaves through an opening to the outside reaches lights at infinity, even if other blocks of the
-/// level stand further on.
+/// Cubes and straight tubes count as convex, so nothing inside them is in the way; they are convex unless faces are
+/// bent. In a bend, the part of the segment between its openings is tested in the canonical frame, where it is straight
+/// if the warp is affine; for other warps only its ends are exact. A line that leaves through an opening to the outside
+/// reaches lights at infinity, even if other blocks of the level stand further on.
 fn through_openings(level: &PlacedLevel, doors: &[f32], receiver: Receiver, toward: Toward) -> f32 {
     let (direction, goal) = match toward {
         Toward::Point { position, block } => (position - receiver.position, Some(block)),
@@ -180,7 +181,7 @@ fn through_openings(level: &PlacedLevel, doors: &[f32], receiver: Receiver, towa
 fn is_free_inside(block: &PlacedBlock, from: DVec3, to: DVec3) -> bool {
     match block.shape.tube() {
         Some(form @ TubeForm::Bend) => {
-            // Texels and lights are on the wall up to the rounding of their positions in the level.
+            // Texels and lights are on the wall only up to the rounding of their world positions.
             let inside = |point| form.drawn_inside(block.unit_from_world.point(point));
             form.segment_is_free(inside(from), inside(to))
         }
@@ -190,8 +191,8 @@ fn is_free_inside(block: &PlacedBlock, from: DVec3, to: DVec3) -> bool {
 
 /// True when the line from `origin` along `direction` passes the portal outwards.
 ///
-/// The line passes a loop when it runs on the same side of all edges; that depends on the corners
-/// alone, so the blocks on both sides of an opening agree, bent openings included.
+/// A line passes a loop of corners when it is on the same side of all edges. The test depends on the corners alone, so
+/// the blocks on both sides of an opening agree, even if it is bent.
 fn leaves_through(portal: &Portal, origin: DVec3, direction: DVec3) -> bool {
     if direction.dot(portal.outward) <= 0.0 {
         return false;

@@ -16,27 +16,28 @@ use crate::modular::scene::{Scene, SceneData};
 use crate::output::lightmap_atlas::LightmapAtlas;
 use mrt_core::storage::Storage;
 
-/// Bytes that positions, normals, albedo, emission, frame buffers and lightmap take for a texel.
+/// Bytes of positions, normals, albedo, emission, frame buffers and lightmap for each texel.
 const BYTES_PER_TEXEL: usize = 4 * 12 + 4 * 12 + 2 * 12;
 
 impl Scene {
-    /// Checks the level, looks up its shapes and assembles `T_b->r`. Of a
-    /// [`StoredDictionary`](crate::modular::dictionary::StoredDictionary), what the level uses is decoded; the scene
-    /// borrows nothing.
+    /// Checks the level, looks up its shapes and assembles `T_b->r`. From a
+    /// [`StoredDictionary`](crate::modular::dictionary::StoredDictionary), only the operators that the level uses are
+    /// decoded. The scene borrows neither the level nor the dictionary.
     ///
-    /// Cost: a k_r x k_e x k_b product for each path of openings that a shape's light takes, and the additions of one
+    /// Cost: by the path table, a k_r x k_e x k_b product for each path of a shape's light, and the addition of one
     /// such matrix for each path in the level; by lightfields, a k_rlf x k_rlf x k_b product for each opening crossed.
-    /// A maze of 13 blocks takes 30 ms on one core, one of 10,000 takes 20 s: assemble large levels on a thread of their
-    /// own.
+    /// A maze of 13 blocks takes 30 ms on one core, a maze of 10,000 blocks 20 s: assemble large levels on a thread of
+    /// their own.
     ///
     /// # Errors
-    /// [`AssembleError`].
+    /// [`AssembleError`], if the level is refused, the dictionary lacks an operator, a setting is out of range, or the
+    /// scene would exceed [`AssembleConfig::max_bytes`].
     pub fn assemble(
         level: &Level,
         dictionary: &Dictionary<impl OperatorMatrix>,
         config: &AssembleConfig,
     ) -> Result<Scene, AssembleError> {
-        // 1. Check what was given.
+        // 1. Check the level and the settings.
         level.check()?;
         check_config(config)?;
         // 2. Look up the operators of each block.
@@ -90,7 +91,7 @@ fn check_config(config: &AssembleConfig) -> Result<(), AssembleError> {
     }
 }
 
-/// Bytes that operators may take, once texels have theirs.
+/// Bytes that operators may take: those that texels leave of [`AssembleConfig::max_bytes`].
 fn bytes_left(config: &AssembleConfig, texels: usize) -> Result<usize, AssembleError> {
     let found = BYTES_PER_TEXEL * texels;
     config

@@ -1,8 +1,8 @@
 //! The dictionary: the operators of the canonical shapes.
 //!
-//! A bake makes its matrices in `f32`. A game may keep them as they are stored, in place in the bytes of a mapped
-//! file ([`StoredDictionary`]); [`assemble`](crate::modular::assemble::assemble) takes either, and decodes what the level
-//! uses.
+//! A bake makes matrices in `f32`. A game may leave them in the bytes of a mapped file, as they are stored
+//! ([`StoredDictionary`]). [`Scene::assemble`](crate::modular::scene::Scene::assemble) takes either, and decodes only
+//! what the level uses.
 
 mod map;
 pub mod operator;
@@ -22,12 +22,12 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::storage::{Storage, StoredMatrix};
 
 impl<M> Dictionary<M> {
-    /// Position in [`Dictionary::shapes`] of a shape, if it is there.
+    /// Position of a shape in [`Dictionary::shapes`]; `None` if it is not there.
     pub fn shape_index(&self, shape: &Shape) -> Option<usize> {
         self.shapes.iter().position(|entry| entry.shape == shape)
     }
 
-    /// The variant for a block of a shape and form, if it is there.
+    /// The variant of a shape for a form, made in the given way; `None` if there is none.
     pub fn variant(
         &self,
         shape: &Shape,
@@ -41,7 +41,7 @@ impl<M> Dictionary<M> {
         })
     }
 
-    /// True when the parities of response modes under both mirrors are known, which version 1 of the format lacks.
+    /// True if the parities of response modes under both mirrors are known. Files of version 1 do not have them.
     pub fn knows_parities(&self) -> bool {
         self.paths
             .response_parity
@@ -54,7 +54,7 @@ impl<M> Dictionary<M> {
         self.paths.response_parity.len()
     }
 
-    /// True when openings may meet with their up directions a quarter turn apart.
+    /// True if joined openings may have their up directions a quarter turn apart.
     pub fn has_exchanges(&self) -> bool {
         self.shapes
             .iter()
@@ -62,19 +62,20 @@ impl<M> Dictionary<M> {
             .any(|opening| opening.emission_from_coefficients.len() == 2)
     }
 
-    /// The same dictionary with every matrix replaced by what `f` makes of it.
+    /// The same dictionary with every matrix replaced by the result of `f`.
     pub fn map<'s, N>(&'s self, mut f: impl FnMut(OperatorKind, &'s M) -> N) -> Dictionary<N> {
         map::map(self, &mut f)
     }
 }
 
 impl<M: OperatorMatrix> Dictionary<M> {
-    /// Every matrix as `f32`.
+    /// The same dictionary with every matrix as `f32`.
     pub fn decode(&self) -> Dictionary {
         self.map(|_, matrix| matrix.decode().into_owned())
     }
 
-    /// Every matrix as [`OperatorKind::storage`] says for `storage`; those that are so already keep their bits.
+    /// The same dictionary with every matrix stored as [`OperatorKind::storage`] of `storage`. Matrices that are stored
+    /// so already keep their bits.
     pub fn stored_as(&self, storage: Storage) -> StoredDictionary<'_> {
         self.map(|kind, matrix| {
             let stored = matrix.as_stored(kind.modes());
@@ -96,25 +97,26 @@ impl<M: OperatorMatrix> Dictionary<M> {
 }
 
 impl<M: OperatorMatrix> LightfieldOperators<M> {
-    /// Every matrix as `f32`.
+    /// The same operators with every matrix as `f32`.
     pub fn decode(&self) -> LightfieldOperators {
         map::map_lightfields(self, &mut |_, matrix: &M| matrix.decode().into_owned())
     }
 }
 
 impl<M> PathTable<M> {
-    /// Openings that the baked table's paths cross at most: without a hole, with one, and with more.
+    /// Most openings that paths of the baked table cross: paths without a hole, with one, and with more.
     pub fn depths(&self) -> [usize; 3] {
         [self.depth, self.hole_depth, 0]
     }
 
-    /// Whether a word is in the table that was baked: one that is not here all the same has been packed away.
+    /// Whether the baked table had a word. If it had, and [`PathTable::entries`] has not, packing has left the word
+    /// out.
     pub fn whole_table_has(&self, word: &Word) -> bool {
         let mut holes = word.crossings().iter().filter(|c| c.hole.is_some());
         let length = word.crossings().len();
         match (holes.next(), holes.next()) {
             (None, _) => length <= self.depth,
-            // Doors and windows stand in side faces.
+            // Doors and windows are in side faces.
             (Some(hole), None) => hole.heading != Face::PosY && length <= self.hole_depth,
             _ => false,
         }
@@ -127,7 +129,7 @@ impl<M: OperatorMatrix> ShapeOperators<M> {
         self.coefficients_from_direct.rows()
     }
 
-    /// Number of joint modes: those of light from the block itself and what light from others needs beyond.
+    /// Number of joint modes: the modes of the block's own light, and further ones for light from other blocks.
     pub fn joint_modes(&self) -> usize {
         self.joint_basis.columns()
     }

@@ -1,8 +1,9 @@
 //! Dictionaries as bytes, in the versioned container of the core.
 //!
-//! Version 2, which is written. The values of a matrix are a section of F32, F16 or I8, column-major; unless they
-//! are F32, the next section holds its scales, one F32 a mode (`OperatorKind::modes`), and is named like it with a
-//! `*` behind, for which names are at most seven bytes long:
+//! This is version 2, the version that is written. The values of a matrix are a section of F32, F16 or I8,
+//! column-major. A matrix of F16 or I8 has a second section with its scales, one F32 for each mode
+//! (`OperatorKind::modes`). Its name is that of the values followed by `*`, so names of values are at most seven bytes
+//! long.
 //!
 //! | section | content |
 //! | --- | --- |
@@ -14,14 +15,14 @@
 //! | `words`, `P<n>` | text, and for each word of it the matrix |
 //! | `shapes`, `variants` | text: names; name and transport with a colon between |
 //! | `corners` | 24 F32 a variant |
-//! | `n.k`, `n.s`, `n.d` | for n counting shapes, then variants: modes and joint modes; singular values; dropped energy, the same of joint modes |
+//! | `n.k`, `n.s`, `n.d` | with n counting shapes, then variants: numbers of modes and joint modes; singular values; dropped energy of modes and joint modes |
 //! | `n.T`, `n.L` | matrices `T_d->b` and `L_imp` |
 //! | `n.J`, `n.Jp`, `n.Jv` | matrices: the joint basis of irradiance, probes, vector irradiance |
 //! | `n.E<m>`, `n.Q<m>` | of opening m: emission from coefficients, joint from response |
 //! | `n.X<m>`, `n.Y<m>` | the same with x and y exchanged, in sets with vertical openings |
 //! | `B_e`, `U_r` | matrices of the sources; absent from packed dictionaries |
 //!
-//! `swap`, `n.L` and `n.Jv` may be empty. Version 1 is read, by `version1.rs`.
+//! `swap`, `n.L` and `n.Jv` may be empty. `version1.rs` reads version 1.
 
 pub mod format;
 mod read;
@@ -38,14 +39,14 @@ use crate::modular::dictionary_file::format::{FORMAT, Source};
 use mrt_core::container::{ByteBudget, Container};
 
 impl<'a> StoredDictionary<'a> {
-    /// Reads the bytes of a dictionary file, of which the matrices stay where they are if the bytes start at a
-    /// multiple of four in memory (a mapped file does); no input makes it panic or allocate beyond `budget`.
+    /// Reads the bytes of a dictionary file. Matrices borrow the bytes if those start at a multiple of four in memory,
+    /// as a mapped file does. No input makes it panic or allocate beyond `budget`.
     ///
-    /// Cost: two passes over the bytes. Matrices of bytes that start elsewhere, and some of files of version 1, are
-    /// copied.
+    /// Cost: two passes over the bytes. Matrices are copied if the bytes are not aligned, and some matrices of version
+    /// 1 always are.
     ///
     /// # Errors
-    /// [`DictionaryError`], at the first thing that is wrong.
+    /// [`DictionaryError`], for the first fault found.
     pub fn read(bytes: &'a [u8], budget: &mut ByteBudget) -> Result<Self, DictionaryError> {
         let container = Container::read(bytes, &FORMAT, budget)?;
         let mut source = Source {
@@ -60,20 +61,20 @@ impl<'a> StoredDictionary<'a> {
 }
 
 impl Dictionary {
-    /// Reads the bytes of a dictionary file and decodes every matrix; no input makes it panic, or allocate more than
+    /// Reads the bytes of a dictionary file and decodes every matrix. No input makes it panic or allocate more than
     /// [`DEFAULT_BYTE_BUDGET`].
     ///
     /// # Errors
-    /// As [`StoredDictionary::read`].
+    /// The errors of [`StoredDictionary::read`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DictionaryError> {
         Self::from_bytes_within(bytes, &mut ByteBudget::new(DEFAULT_BYTE_BUDGET))
     }
 
-    /// Reads the bytes of a dictionary file and decodes every matrix; no input makes it panic or allocate beyond
+    /// Reads the bytes of a dictionary file and decodes every matrix. No input makes it panic or allocate beyond
     /// `budget`.
     ///
     /// # Errors
-    /// As [`StoredDictionary::read`].
+    /// The errors of [`StoredDictionary::read`].
     pub fn from_bytes_within(
         bytes: &[u8],
         budget: &mut ByteBudget,

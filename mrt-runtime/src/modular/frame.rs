@@ -1,8 +1,9 @@
 //! A frame: lights in, indirect irradiance out (Loos et al. 2011, section 7.3).
 //!
-//! Cost follows what is lit and what changed, not what is loaded. A block that no light reaches is not touched. A block
-//! whose radiosity did not change keeps its coefficients, and blocks that no changed block sends light to keep their
-//! light. Everything kept has the bits that computing it again would give ([`FrameConfig::tolerance`] allows more).
+//! The cost of a frame depends on what is lit and what changed, not on the size of the level. A block that no light
+//! reaches costs nothing. A block whose radiosity did not change keeps its coefficients, and a block keeps its light if
+//! no changed block sends light to it. Kept values have the same bits as recomputed ones, unless
+//! [`FrameConfig::tolerance`] allows differences.
 
 pub mod config;
 pub mod error;
@@ -30,7 +31,7 @@ use crate::modular::frame::direct_stage::{DirectJob, DirectStage};
 use crate::modular::frame::error::FrameError;
 use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::light_list::{LightId, LightList};
-use crate::modular::frame::outputs::OutputBuffers;
+use crate::modular::frame::outputs::{OutputBuffers, OutputStage};
 use crate::modular::frame::report::{FrameReport, FrameWork, ReportSlot};
 use crate::modular::frame::schedule::Schedule;
 use crate::modular::frame::stage_clock::{Stage, StageClock};
@@ -40,17 +41,19 @@ use crate::output::lightmap::Lightmap;
 use crate::output::probe_order::PROBE_COEFFICIENTS;
 use crate::output::probes::{Probes, irradiance_from_probe};
 use glam::Vec3;
+use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::hemisphere_sh::evaluate_f32;
 use std::num::NonZero;
 
 /// The light of a scene, frame by frame.
 ///
-/// It keeps its [`Scene`], and owns what changes while a game runs: lights, doors, what walls reflect and emit, and the
-/// buffers of every stage. Frames allocate nothing, what a caller's [`Executor`](crate::executor::Executor) does aside,
-/// as long as the [`FrameReport`] of the frame before has been dropped.
+/// A frame keeps its [`Scene`], and owns all that changes while a game runs: lights, doors, albedo and emission of
+/// walls, and the buffers of every stage. Solving allocates nothing, with three exceptions: the caller's
+/// [`Executor`](crate::executor::Executor) may allocate, so does a frame whose previous [`FrameReport`] still exists,
+/// and so does a list of skipped lights that is longer than all before.
 ///
-/// Signals that are copied out are block by block in the level's order, in a block channel by channel (red, green, blue),
-/// in a channel texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).
+/// Signals are copied out block by block in the level's order, in a block channel by channel (red, green, blue), in a
+/// channel texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).
 #[derive(Debug)]
 pub struct Frame {
     scene: Scene,
@@ -65,7 +68,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// A dark frame of a scene. Of the outputs asked for, those come that the dictionary was baked with.
+    /// A dark frame of a scene. Outputs in `config` that the dictionary was not baked with stay empty.
     pub fn new(scene: &Scene, config: FrameConfig) -> Self {
         let tasks = LightBuffers::task_count(config.executor.workers());
         let (surface, emits) = Surface::new(scene);
@@ -82,58 +85,58 @@ impl Frame {
         }
     }
 
-    /// The scene that is lit.
+    /// The scene of this frame.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// How frames are computed.
+    /// The settings of this frame.
     pub fn config(&self) -> &FrameConfig {
         &self.config
     }
 
-    /// Changes which bounces the next frame computes.
+    /// Changes [`FrameConfig::bounces`] from the next solve on.
     pub fn set_bounces(&mut self, bounces: Bounces) {
         self.config.bounces = bounces;
     }
 
-    /// Changes [`FrameConfig::tolerance`], W/m².
+    /// Changes [`FrameConfig::tolerance`], W/m², from the next solve on.
     pub fn set_tolerance(&mut self, tolerance: f32) {
         self.config.tolerance = tolerance;
     }
 
-    /// Changes [`FrameConfig::slice`].
+    /// Changes [`FrameConfig::slice`] from the next solve on.
     pub fn set_slice(&mut self, slice: Option<NonZero<usize>>) {
         self.config.slice = slice;
     }
 }
 
-/// Lights.
+/// Adding, changing and removing lights.
 impl Frame {
-    /// Adds a light, which shines from the next frame on. Any light is taken: one with absurd values, or in no block, is
-    /// skipped and named by [`FrameReport::skipped_lights`], as are all beyond
-    /// [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS).
+    /// Adds a light, which shines from the next solve on. Every light gets an id: a light with values out of range, in
+    /// no block, or beyond [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS) is skipped, and
+    /// [`FrameReport::skipped_lights`] names it.
     pub fn add_light(&mut self, light: Light) -> LightId {
         self.lights.add(&self.scene.level, light)
     }
 
-    /// Moves or changes a light. False if it was removed before.
+    /// Moves or changes a light. Returns false if the light was removed before.
     pub fn set_light(&mut self, id: LightId, light: Light) -> bool {
         self.lights.set(&self.scene.level, id, light)
     }
 
-    /// Removes a light and returns it; the others keep their ids and, where nothing else changes, their light.
+    /// Removes a light and returns it; `None` if it was removed before. Other lights keep their ids.
     pub fn remove_light(&mut self, id: LightId) -> Option<Light> {
         self.lights.remove(&self.scene.level, id)
     }
 
-    /// Replaces all lights; ids given before name no light any more. For games that keep a list of their own: lights that
-    /// keep their place in it cost nothing if they did not change.
+    /// Replaces all lights; earlier ids no longer name a light. For games that keep a list of their own: an unchanged
+    /// light at an unchanged position in the list is not computed again.
     pub fn set_lights(&mut self, lights: &[Light]) {
         self.lights.replace(&self.scene.level, lights);
     }
 
-    /// A light; `None` if it was removed.
+    /// The light that an id names; `None` if it was removed.
     pub fn light(&self, id: LightId) -> Option<Light> {
         self.lights.get(id)
     }
@@ -144,11 +147,12 @@ impl Frame {
     }
 }
 
-/// What changes while a game runs.
+/// Doors, colours and scenes that change while a game runs.
 impl Frame {
-    /// Opens or closes a door, by its position in [`Level::doors`](crate::level::block::Level::doors), for direct and
-    /// indirect light: 1 lets everything through, 0 nothing; light that does not pass is lost. The next frame sees it.
-    /// [`Rays`](crate::light::visibility::Rays) ask the caller's function alone, which must know about doors.
+    /// Opens or closes a door, named by its position in [`Level::doors`](crate::level::block::Level::doors), for direct
+    /// and indirect light. 1 lets all light through, 0 none; light that does not pass is lost. It takes effect in the
+    /// next solve. With [`Rays`](crate::light::visibility::Rays), the caller's function must take doors into account
+    /// for direct light.
     ///
     /// # Errors
     /// [`FrameError::Door`], if there is no such door or the value is not in [0, 1].
@@ -168,17 +172,17 @@ impl Frame {
         }
     }
 
-    /// How much light each door lets through.
+    /// Fraction of light in [0, 1] that each door lets through.
     pub fn doors(&self) -> &[f32] {
         &self.light.doors
     }
 
-    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels; texels
-    /// in holes keep none. The next frame sees it, and computes what it changes.
+    /// Gives each texel of a block an albedo of its own, linear RGB, in the order of the canonical shape's texels.
+    /// Texels in holes stay black. The next solve computes all light that it changes.
     ///
     /// # Errors
-    /// [`SurfaceError`], if there is no such block, if the number of values is not the number of texels, or if a value is
-    /// outside [0, 1]; nothing then changes.
+    /// [`SurfaceError`], if there is no such block, if the number of values is not the number of texels, or if a value
+    /// is outside [0, 1]. The frame is then unchanged.
     pub fn set_texel_albedo(
         &mut self,
         block: BlockIndex,
@@ -189,10 +193,11 @@ impl Frame {
         Ok(())
     }
 
-    /// Lets each texel of a block emit radiosity of its own, linear RGB, W/m², in the same order.
+    /// Gives each texel of a block an emitted radiosity of its own, linear RGB, W/m², in the order of the canonical
+    /// shape's texels. Texels in holes stay black.
     ///
     /// # Errors
-    /// [`SurfaceError`], as for [`Frame::set_texel_albedo`], with values in [0, 1e9].
+    /// [`SurfaceError`], as in [`Frame::set_texel_albedo`], if a value is outside [0, 1e9].
     pub fn set_texel_emission(
         &mut self,
         block: BlockIndex,
@@ -210,15 +215,17 @@ impl Frame {
         Some(self.surface.albedo.get(slot))
     }
 
-    /// Radiosity that a texel of a block emits of itself, linear RGB, W/m²; `None` if there is no such block or texel.
+    /// Radiosity that a texel of a block emits, linear RGB, W/m²; `None` if there is no such block or texel.
     pub fn texel_emission(&self, block: BlockIndex, texel: usize) -> Option<Vec3> {
         let slot = self.scene.layout.slot(block, texel)?;
         Some(self.surface.emission.get(slot))
     }
 
-    /// Goes on with another scene, such as the same level with blocks added or removed. Lights and their ids stay, and
-    /// light goes on where `old_block` names the block of the present scene that a block of the new one was, if both have
-    /// the same shape; all else starts dark, with the doors and colours of the new level.
+    /// Replaces the scene, for example by the same level with blocks added or removed. Lights and their ids stay.
+    ///
+    /// For each block of the new scene, `old_block` may name the same block in the present scene. Its indirect light
+    /// then stays on the walls that both have: a cube that gains or loses an opening keeps the light of its other
+    /// walls; a tube must keep its shape. All other walls start dark. Doors and colours are those of the new level.
     ///
     /// Allocates the buffers of the new scene.
     pub fn change_scene(
@@ -229,50 +236,70 @@ impl Frame {
         let mut next = Frame::new(scene, self.config.clone());
         std::mem::swap(&mut next.lights, &mut self.lights);
         next.lights.place_in(&scene.level);
-        let (from, to) = (&self.scene, scene);
-        for (block, placed) in to.level.blocks.iter().enumerate() {
-            let block = BlockIndex::new(block);
-            let old = old_block(block).filter(|old| {
-                let old = from.level.block(*old);
-                old.is_some_and(|old| {
-                    old.shape == placed.shape && old.texels.len() == placed.texels.len()
-                })
-            });
-            let Some(old) = old else { continue };
-            let rank = to.layout.rank[block.get()];
-            let texel_of_slot = &to.layout.texel_of_slot[to.layout.shape(rank)];
-            for (slot, &texel) in to.layout.slots(rank).zip(texel_of_slot) {
-                if let Some(shown) = from.layout.slot(old, texel as usize) {
-                    let irradiance = self.light.indirect.get(shown);
-                    next.light.indirect.set(slot, irradiance);
-                }
-            }
-            let old = &self.schedule.state[from.layout.rank[old.get()].get()];
-            if old.has_indirect {
-                next.schedule.state[rank.get()].has_indirect = true;
-                next.schedule.touch(rank, f32::INFINITY);
+        for block in (0..scene.level.blocks.len()).map(BlockIndex::new) {
+            if let Some(old) = old_block(block) {
+                next.take_indirect(block, self, old);
             }
         }
         *self = next;
     }
+
+    /// Takes the indirect light of a block from a block of another frame, at the walls that both have.
+    fn take_indirect(&mut self, block: BlockIndex, from: &Frame, old: BlockIndex) {
+        let (level, old_level) = (&self.scene.level, &from.scene.level);
+        let (Some(placed), Some(old_placed)) = (level.block(block), old_level.block(old)) else {
+            return;
+        };
+        let old_state = &from.schedule.state[from.scene.layout.rank[old.get()].get()];
+        if placed.shape.form != old_placed.shape.form
+            || level.resolution != old_level.resolution
+            || !old_state.has_indirect
+        {
+            return;
+        }
+        let mut old_texel = vec![None; placed.texels.len()];
+        for face in Face::ALL {
+            for row in 0..level.resolution {
+                for column in 0..level.resolution {
+                    if let Some(texel) = level.level_texel(block, face, row, column) {
+                        old_texel[texel] = old_level.level_texel(old, face, row, column);
+                    }
+                }
+            }
+        }
+        let layout = &self.scene.layout;
+        let rank = layout.rank[block.get()];
+        let texel_of_slot = &layout.texel_of_slot[layout.shape(rank)];
+        for (slot, &texel) in layout.slots(rank).zip(texel_of_slot) {
+            let texel = old_texel.get(texel as usize).copied().flatten();
+            if let Some(shown) = texel.and_then(|texel| from.scene.layout.slot(old, texel)) {
+                let irradiance = from.light.indirect.get(shown);
+                self.light.indirect.set(slot, irradiance);
+            }
+        }
+        self.schedule.state[rank.get()].has_indirect = true;
+        self.schedule.touch(rank, f32::INFINITY);
+        // The lightmap of the new scene is dark: show this light at once, even where blocks wait for their turn.
+        self.schedule.mark_changed(rank);
+    }
 }
 
-/// Computing.
+/// Computing light.
 impl Frame {
-    /// Computes direct and indirect irradiance. Shadows of direct light are those of walls and openings.
+    /// Computes direct and indirect irradiance, with shadows of direct light by walls and openings.
     ///
-    /// Nothing stops a frame: lights that cannot shine are skipped and named in the report.
+    /// It cannot fail: lights that cannot shine are skipped, and the report names them.
     pub fn solve(&mut self) -> FrameReport {
         self.solve_with(&Openings)
     }
 
-    /// As [`Frame::solve`], with shadows of direct light that the caller decides, such as rays into the real mesh.
+    /// Same as [`Frame::solve`], with shadows of direct light by the caller, such as rays into the real mesh.
     pub fn solve_with<V: Visibility>(&mut self, visibility: &V) -> FrameReport {
         let mut clock = StageClock::start();
         let report = self.report.begin();
-        // 1. Lights that can shine.
+        // 1. List the lights that cannot shine.
         self.lights.list_skipped(&mut report.skipped);
-        // 2. Direct light at texels.
+        // 2. Compute direct light at texels.
         let job = DirectJob {
             scene: &self.scene,
             config: &self.config,
@@ -290,15 +317,16 @@ impl Frame {
             ..FrameWork::default()
         };
         clock.lap(Stage::Direct);
-        // 3. Bounces, and 4. what is shown of them.
+        // 3. Compute bounces. 4. Fill outputs.
         self.finish(clock)
     }
 
-    /// As [`Frame::solve`], for direct irradiance that the caller computed, W/m², in the order of
-    /// [`Frame::copy_indirect_to`].
+    /// Same as [`Frame::solve`], from direct irradiance that the caller computed, W/m², in the order of
+    /// [`Frame::copy_direct_to`]. The lights of the frame do not shine, and the report has no skipped lights.
     ///
     /// # Errors
-    /// [`FrameError::Direct`]; the frame is then as it was.
+    /// [`FrameError::Direct`], if the number of values is not three for each texel, or a value is negative, too large
+    /// or NaN. The frame is then unchanged.
     pub fn solve_from_direct(&mut self, direct: &[f32]) -> Result<FrameReport, FrameError> {
         let mut clock = StageClock::start();
         let is_irradiance = |e: &f32| (0.0..=MAX_LIGHT_VALUE).contains(e);
@@ -323,7 +351,7 @@ impl Frame {
         Ok(self.finish(clock))
     }
 
-    /// Bounces the direct light there is, and fills outputs and report.
+    /// Computes bounces of the present direct light, and fills outputs and report.
     fn finish(&mut self, mut clock: StageClock) -> FrameReport {
         let report = self.report.data();
         let mut bounces = BounceStage {
@@ -338,17 +366,18 @@ impl Frame {
         };
         report.passes = bounces.run();
         if report.passes == 0 {
-            // Where truncation leaves walls dark, probes may still hold a little light, and no list knows of it.
+            // Truncation can leave a little light in probes of blocks whose walls are dark, and those blocks are in no
+            // list.
             self.outputs.darken();
         }
-        self.outputs.fill(
-            &self.scene,
-            &self.config,
-            &mut self.schedule,
-            &mut self.light,
+        self.outputs.fill(OutputStage {
+            scene: &self.scene,
+            config: &self.config,
+            schedule: &mut self.schedule,
+            light: &mut self.light,
             report,
-            &mut clock,
-        );
+            clock: &mut clock,
+        });
         #[cfg(feature = "timing")]
         {
             report.times = clock.times();
@@ -356,32 +385,32 @@ impl Frame {
         self.report.finish()
     }
 
-    /// The report of the last frame, once more.
+    /// The report of the last solve; an empty one before the first.
     pub fn last_report(&self) -> FrameReport {
         self.report.finish()
     }
 
-    /// Lets the next frame compute everything anew, as if nothing were known: for measurements, and for callers who
-    /// changed what frames cannot see.
+    /// Makes the next solve compute everything again. For measurements, and for callers whose shadows changed without a
+    /// new [`version`](Visibility::version).
     pub fn forget(&mut self) {
         self.direct_stage.forget();
         self.schedule.all_stale = true;
     }
 }
 
-/// Results.
+/// Reading results.
 impl Frame {
-    /// Direct irradiance, W/m², of all texels: replaces what `out` holds.
+    /// Replaces the content of `out` by the direct irradiance, W/m², of all texels.
     pub fn copy_direct_to(&self, out: &mut Vec<f32>) {
         self.scene.layout.copy_by_texel(&self.light.direct, out);
     }
 
-    /// Indirect irradiance, W/m², of all texels, not multiplied by the receiving texel's albedo: replaces what `out` holds.
+    /// Replaces the content of `out` by the indirect irradiance, W/m², of all texels, not multiplied by their albedo.
     pub fn copy_indirect_to(&self, out: &mut Vec<f32>) {
         self.scene.layout.copy_by_texel(&self.light.indirect, out);
     }
 
-    /// Coefficients b, block by block, channel by channel: replaces what `out` holds.
+    /// Replaces the content of `out` by the coefficients b, block by block, in a block channel by channel.
     pub fn copy_coefficients_to(&self, out: &mut Vec<f32>) {
         out.clear();
         let rows = &self.scene.rows;
@@ -406,18 +435,20 @@ impl Frame {
         Some(self.light.indirect.get(slot))
     }
 
-    /// The padded lightmap of indirect irradiance; of no pixels if not asked for.
+    /// The padded lightmap of indirect irradiance; without pixels unless
+    /// [`Outputs::lightmap`](config::Outputs::lightmap) is set.
     pub fn lightmap(&self) -> Lightmap<'_> {
         Lightmap::new(&self.scene.atlas, &self.outputs.lightmap)
     }
 
-    /// Probes, if asked for and the dictionary has them.
+    /// All probes; `None` unless [`Outputs::probes`](config::Outputs::probes) is set and the dictionary has probes.
     pub fn probes(&self) -> Option<&Probes> {
         self.outputs.probes.as_ref()
     }
 
-    /// Spherical harmonics of indirect light, RGB each, at a point in metres: trilinear between the probes around it. `None`
-    /// outside all blocks, and without probes ([`Outputs::probes`](config::Outputs::probes)).
+    /// Spherical harmonics of indirect radiance in world axes, with RGB for each, at a point in metres: trilinear
+    /// between the probes around it. `None` outside all blocks, and without probes
+    /// ([`Outputs::probes`](config::Outputs::probes)).
     ///
     /// Cost: independent of the number of blocks.
     pub fn probe_at(&self, point: Vec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
@@ -425,22 +456,22 @@ impl Frame {
         probes.at(&self.scene.level, point.as_dvec3())
     }
 
-    /// Indirect irradiance, W/m², RGB, on a surface with a unit normal at a point in metres, such as that of a thing that
-    /// moves; `None` where [`Frame::probe_at`] is.
+    /// Indirect irradiance, W/m², RGB, on a surface with a unit normal at a point in metres, such as the surface of a
+    /// moving object; `None` where [`Frame::probe_at`] is `None`.
     pub fn irradiance_at(&self, point: Vec3, normal: Vec3) -> Option<Vec3> {
         Some(irradiance_from_probe(&self.probe_at(point)?, normal))
     }
 
-    /// Vector irradiance, if asked for and the dictionary has it: block by block, in a block channel by channel, in a
-    /// channel texel by texel four coefficients of 1, v, normal and u in the texel's tangent frame.
-    /// [`evaluate_f32`] gives irradiance for a normal.
+    /// Vector irradiance: block by block, in a block channel by channel, in a channel texel by texel, for each texel
+    /// four coefficients of 1, v, normal and u in the texel's tangent frame. [`evaluate_f32`] gives the irradiance for
+    /// a normal. Empty unless [`Outputs::vector`](config::Outputs::vector) is set and the dictionary has it.
     pub fn vector(&self) -> &[f32] {
         &self.outputs.vector
     }
 
-    /// Indirect irradiance, W/m², RGB, at one texel of a block for a unit normal in the texel's tangent frame (along u,
-    /// along v, along the wall's normal); 0 where truncation makes it negative. `None` if there is no such block or texel,
-    /// and without vector irradiance ([`Outputs::vector`](config::Outputs::vector)).
+    /// Indirect irradiance, W/m², RGB, at one texel of a block for a unit normal in the texel's tangent frame (its
+    /// components along u, along v, along the wall's normal); 0 where truncation makes it negative. `None` if there is
+    /// no such block or texel, and without vector irradiance ([`Outputs::vector`](config::Outputs::vector)).
     pub fn vector_at(&self, block: BlockIndex, texel: usize, normal: Vec3) -> Option<Vec3> {
         let range = &self.scene.level.block(block)?.texels;
         if texel >= range.len() || self.outputs.vector.is_empty() {
@@ -456,7 +487,7 @@ impl Frame {
     }
 }
 
-/// Blocks whose direct light a frame brings up to date.
+/// Most blocks whose direct light one frame computes.
 fn blocks_at_most(config: &FrameConfig) -> usize {
     match (config.slice, config.bounces) {
         (Some(slice), Bounces::Count(1) | Bounces::Feedback) => slice.get(),

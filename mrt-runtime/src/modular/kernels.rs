@@ -1,4 +1,5 @@
-//! The products of a frame, one block at a time, each written once over [`Lanes`](mrt_core::simd::Lanes).
+//! The products of a frame, one block at a time. Each is written once for all instruction sets, with
+//! [`Lanes`](mrt_core::simd::Lanes).
 
 pub(crate) mod scratch;
 pub(crate) mod coefficients;

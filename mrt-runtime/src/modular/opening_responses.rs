@@ -1,5 +1,6 @@
-//! `T_b->r` in the paper's form, for tools that compare with it: responses for each opening that light enters by, as
-//! they are before [`Scene::assemble`](crate::modular::scene::Scene::assemble) projects them on joint bases (Loos et al. 2011, section 6.3).
+//! `T_b->r` in the form of the paper, for tools that compare with it: responses for each opening that light enters by,
+//! before [`Scene::assemble`](crate::modular::scene::Scene::assemble) projects them on joint bases (Loos et al. 2011,
+//! section 6.3).
 
 use crate::level::block::Level;
 use crate::level::block_index::BlockIndex;
@@ -12,29 +13,30 @@ use crate::modular::propagate::follow_all;
 use crate::modular::scene::SceneData;
 use mrt_core::linalg::matrix::Matrix;
 
-/// How the light of one block answers behind one opening of another.
+/// Responses to the light of one block behind one opening of another.
 #[derive(Clone, Debug)]
 pub struct OpeningResponses {
-    /// Block that light enters.
+    /// The block that light enters.
     pub target: BlockIndex,
-    /// Position in its shape's openings of the one that it enters by.
+    /// Position, in the openings of that block's shape, of the opening that light enters by.
     pub opening: usize,
-    /// True in the opening's frame with x and y exchanged; never in levels whose openings all keep up.
+    /// Whether responses are in the opening's frame with x and y exchanged. Always false in levels whose openings all
+    /// have +y up.
     pub exchanged: bool,
-    /// Block that it comes from.
+    /// The block that light comes from.
     pub source: BlockIndex,
     /// Response modes x coefficients b of the source.
     pub responses: Matrix<f32>,
 }
 
-/// All responses of a scene, source by source, doors taken as open. With the joint basis times
-/// [`joint_from_response`](crate::modular::dictionary::OpeningOperators::joint_from_response) as `U_r` of each opening they make
-/// the same light as the scene.
+/// All responses of a scene, source by source, with open doors. Multiplied by `U_r` of each opening, they make the same
+/// light as the scene; `U_r` is the joint basis times
+/// [`joint_from_response`](crate::modular::dictionary::OpeningOperators::joint_from_response).
 ///
-/// Cost: that of assembling the scene again; k_r x k_b numbers an opening and source.
+/// Cost: the time of assembling the scene again, and k_r x k_b numbers for each opening and source.
 ///
 /// # Errors
-/// [`AssembleError`], if `scene` could not be assembled so from the level and the dictionary.
+/// [`AssembleError`], if a scene cannot be assembled from the level, the dictionary and the settings.
 pub fn responses_by_opening(
     level: &Level,
     scene: &SceneData,

@@ -1,4 +1,4 @@
-//! Leaves out of a dictionary what a level does not use, so that a game ships no more.
+//! Packs a dictionary for a level: leaves out what the level does not use, so that a game ships less.
 
 use crate::level::block::Level;
 use crate::modular::assemble::config::Coupling;
@@ -8,21 +8,21 @@ use crate::modular::assemble::place::place_level;
 use crate::modular::dictionary::{Dictionary, LightfieldOperators, OperatorMatrix, ShapeOperators};
 use crate::modular::propagate::table::used_paths;
 
-/// What of a dictionary is kept beside the operators that the level uses.
+/// What a packed dictionary keeps besides the operators that the level needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackConfig {
-    /// Bases of probes.
+    /// Whether to keep the bases of probes.
     pub probes: bool,
-    /// Bases of vector irradiance.
+    /// Whether to keep the bases of vector irradiance.
     pub vector: bool,
-    /// What tools need and frames do not: `L_imp`, and with probes [`Dictionary::sources`].
+    /// Whether to keep what only tools need: `L_imp`, and with probes [`Dictionary::sources`].
     pub sources: bool,
-    /// Lightfields, for [`Coupling::Lightfield`].
+    /// Whether to keep lightfields, for [`Coupling::Lightfield`].
     pub lightfields: bool,
 }
 
 impl Default for PackConfig {
-    /// All that frames can use.
+    /// Everything that frames can use.
     fn default() -> Self {
         Self {
             probes: true,
@@ -35,12 +35,12 @@ impl Default for PackConfig {
 
 /// The part of a dictionary that a level uses: its shapes, their variants, and the paths that light takes in it.
 ///
-/// With lightfields kept, scenes are the same to the last bit, whatever the depth to which light is followed; without,
-/// light ends at the table's longest path. Matrices are cloned, which
-/// copies those that are not borrowed.
+/// If lightfields are kept, the scene of the level is the same to the last bit, at every depth. Otherwise, light ends
+/// at the longest path of the table. Matrices are cloned; borrowed ones are not copied.
 ///
 /// # Errors
-/// As [`Scene::assemble`](crate::modular::scene::Scene::assemble) with default settings, but for [`AssembleError::TooLarge`].
+/// The errors of [`Scene::assemble`](crate::modular::scene::Scene::assemble) with default settings, except
+/// [`AssembleError::TooLarge`].
 pub fn pack<M: OperatorMatrix>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -52,7 +52,7 @@ pub fn pack<M: OperatorMatrix>(
     let needs_lightfields =
         usable_coupling(level, dictionary, Coupling::Table)? == Coupling::Lightfield;
     let used_paths = used_paths(&placed.blocks, &dictionary.paths)?;
-    // Everything but the matrices is small, so leaving out is simpler than choosing.
+    // Removing from a clone is simpler than choosing: everything but the matrices is small.
     let mut packed = dictionary.clone();
     packed
         .shapes
@@ -85,21 +85,26 @@ pub fn pack<M: OperatorMatrix>(
     if !config.probes {
         packed.probes = 0;
     }
-    // A response basis has rows for probes, so there is none for a dictionary that lost them.
+    // The response basis in the sources has rows for probes, so it does not fit a dictionary without them.
     if !config.sources || packed.probes != dictionary.probes {
         packed.sources = None;
     }
     if !config.lightfields && !needs_lightfields {
-        packed.lightfields = LightfieldOperators {
-            parity: Vec::new(),
-            from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
-            straight: M::empty(0, 0),
-            left: M::empty(0, 0),
-            exchange: M::empty(0, 0),
-            holes: Vec::new(),
-            response_from_lightfield: M::empty(dictionary.response_modes(), 0),
-            dropped_energy: dictionary.lightfields.dropped_energy,
-        };
+        packed.lightfields = no_lightfields(dictionary);
     }
     Ok(packed)
+}
+
+/// Lightfield operators without modes, for the emission and response modes of a dictionary.
+fn no_lightfields<M: OperatorMatrix>(dictionary: &Dictionary<M>) -> LightfieldOperators<M> {
+    LightfieldOperators {
+        parity: Vec::new(),
+        from_emission: M::empty(0, dictionary.paths.emission_parity.len()),
+        straight: M::empty(0, 0),
+        left: M::empty(0, 0),
+        exchange: M::empty(0, 0),
+        holes: Vec::new(),
+        response_from_lightfield: M::empty(dictionary.response_modes(), 0),
+        dropped_energy: dictionary.lightfields.dropped_energy,
+    }
 }

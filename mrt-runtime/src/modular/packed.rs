@@ -1,8 +1,8 @@
-//! What frames read: operators in the order in which kernels take them.
+//! Operators as frames read them, in the order in which kernels use their numbers.
 //!
-//! Texels of a block are kept in **slots** ([`Folding`]), so that mirrored texels stand at equal distances and even and
-//! odd parts are sums and differences of whole vectors. Blocks of one shape stand one after another, and its operators
-//! stay in the cache from block to block.
+//! The texels of a block are stored in **slots** ([`Folding`]), such that mirrored texels are at equal distances, and
+//! even and odd parts are sums and differences of whole vectors. Blocks of one shape follow each other, so that the
+//! operators of the shape stay in the cache from block to block.
 
 pub mod numbers;
 pub mod folding;

@@ -1,33 +1,33 @@
-//! Paths of light through openings, in a form that all of them share.
+//! Paths of light through openings, in canonical form.
 //!
-//! A straight ray through a grid of cubes never uses two opposite headings. So after turning and mirroring, its
-//! first heading is +z, the first one that differs +x, and the third one +y: a path is a word over z, x and y. A
-//! dictionary stores one operator a word, and a level finds the word and the symmetry that
-//! leads back to it.
+//! A straight ray through a grid of cubes never uses two opposite headings. A symmetry of the cube makes its first
+//! heading +z, the first other heading +x, and the third +y. So a path is a word over the letters z, x and y. A
+//! dictionary stores one operator for each word; for a path in a level, assembly finds the word, and the symmetry that
+//! takes the word to the path.
 //!
-//! The canonical emitter is the unit cube that light leaves through z = 1. The canonical receiver is the unit
-//! cube that light enters through z = 0, heading for +z.
+//! Light leaves the canonical emitter, a unit cube, through z = 1. Light enters the canonical receiver, a unit cube,
+//! through z = 0, heading for +z.
 
 use crate::level::shape::{Hole, Outline};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 
-/// Longest word: openings crossed by a path of a table.
+/// Most openings that a path of a table crosses: the length of the longest word.
 pub const MAX_WORD: usize = 12;
 
 /// One crossing of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Crossing {
-    /// Heading: +x, +y or +z.
+    /// Direction of travel: +x, +y or +z.
     pub heading: Face,
-    /// The hole that it passes; `None` for a missing face.
+    /// The hole that the path passes; `None` for a missing face.
     pub hole: Option<HoleIndex>,
 }
 
-/// Position in [`Hole::ALL`].
+/// Position of a hole in [`Hole::ALL`].
 pub type HoleIndex = u8;
 
-/// A canonical sequence of crossings, the first one with heading +z.
+/// A canonical path: a sequence of crossings, the first with heading +z.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Word(Vec<Crossing>);
 
@@ -51,13 +51,13 @@ impl Word {
             .map_or(Face::PosZ, |crossing| crossing.heading)
     }
 
-    /// True when some crossing has this heading.
+    /// True if a crossing has this heading.
     pub fn uses(&self, heading: Face) -> bool {
         self.0.iter().any(|crossing| crossing.heading == heading)
     }
 
-    /// All words of up to `depth` crossings; those with a hole have exactly one, and up to `hole_depth`
-    /// crossings. Without `vertical` no path has heading +y.
+    /// All words without a hole of up to `depth` crossings, and all with exactly one hole of up to `hole_depth`
+    /// crossings. Without `vertical`, no word has heading +y.
     pub fn all(depth: usize, hole_depth: usize, holes: &[Hole], vertical: bool) -> Vec<Word> {
         let mut words = Vec::new();
         let mut front = vec![Word::default()];
@@ -80,7 +80,7 @@ impl Word {
                             hole: None,
                         }));
                     }
-                    // Doors and windows stand in side faces, and their up is y.
+                    // Doors and windows are in side faces, and stand upright along y.
                     if !has_hole && length <= hole_depth && heading != Face::PosY {
                         next.extend(holes.iter().map(|hole| {
                             word.then(Crossing {
@@ -101,7 +101,7 @@ impl Word {
         words
     }
 
-    /// As text: a letter a crossing, followed by `d` for a door or `w` for a window.
+    /// The word as text: one letter for each crossing, followed by `d` for a door or `w` for a window.
     pub fn name(&self) -> String {
         let mut name = String::new();
         for crossing in &self.0 {
@@ -113,7 +113,8 @@ impl Word {
         name
     }
 
-    /// The word of that name, if it is canonical.
+    /// The word with that [`name`](Word::name); `None` if the text is not a canonical word of up to [`MAX_WORD`]
+    /// crossings.
     pub fn from_name(name: &str) -> Option<Word> {
         let mut word = Word::default();
         for letter in name.chars() {
@@ -139,7 +140,7 @@ impl Word {
         (1..=MAX_WORD).contains(&word.0.len()).then_some(word)
     }
 
-    /// Cells, relative to the emitter's, that the path stands in after each crossing.
+    /// The cell, relative to the emitter's, that the path is in after each crossing.
     pub fn cells(&self) -> impl Iterator<Item = [i32; 3]> + '_ {
         self.0.iter().scan([0; 3], |cell, crossing| {
             cell[crossing.heading.axis()] += 1;
@@ -148,10 +149,10 @@ impl Word {
     }
 }
 
-/// Letters of [`Hole::ALL`] in names of words.
+/// The letter of each of [`Hole::ALL`] in names of words.
 const HOLE_LETTERS: [char; 2] = ['d', 'w'];
 
-/// The hole index of an opening.
+/// Index of the hole of an opening; `None` if it is not a hole.
 pub fn hole_of(outline: Outline) -> Option<HoleIndex> {
     match outline {
         Outline::Whole | Outline::Disc => None,
@@ -159,8 +160,8 @@ pub fn hole_of(outline: Outline) -> Option<HoleIndex> {
     }
 }
 
-/// The rotation that takes the canonical heading +z to a heading through a shape's face: side headings keep +y
-/// up, and the other two turn it towards +z or -z.
+/// The reference frame of a heading: the rotation that takes the canonical heading +z to it. For side headings, +y
+/// stays up; for the other two, +y turns to +z or -z.
 pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
     let images = match heading {
         Face::PosZ => [Face::PosX, Face::PosY, Face::PosZ],
@@ -173,18 +174,18 @@ pub fn frame_of_heading(heading: Face) -> CubeSymmetry {
     CubeSymmetry::from_images(images[0], images[1], images[2]).unwrap_or(CubeSymmetry::IDENTITY)
 }
 
-/// How a frame stands to the one of [`frame_of_heading`] with the same heading: `frame = reference after
-/// exchange after mirrors`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The difference between a frame and the reference frame of its heading ([`frame_of_heading`]): `frame = reference
+/// after exchange after mirrors`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Roll {
-    /// True when x and y are exchanged.
+    /// Whether x and y are exchanged.
     pub exchanged: bool,
-    /// Mirrors before that: bit 0 of x, bit 1 of y.
+    /// Mirrors that are applied before the exchange: bit 0 for x, bit 1 for y.
     pub mirrors: u8,
 }
 
 impl Roll {
-    /// Of a frame whose z image is `heading`.
+    /// The roll of a frame.
     pub fn of(frame: CubeSymmetry) -> Roll {
         let reference = frame_of_heading(frame.face(Face::PosZ));
         let g = reference.inverse().after(frame);
@@ -201,7 +202,7 @@ impl Roll {
         }
     }
 
-    /// Sign that a mode of a parity (bit 0: odd in x, bit 1: odd in y) takes from the mirrors.
+    /// Sign that the mirrors give a mode. Its parity has bit 0 set if the mode is odd in x, bit 1 if odd in y.
     pub fn sign(self, parity: u8) -> f32 {
         if (parity & self.mirrors).count_ones() % 2 == 1 {
             -1.0
@@ -211,7 +212,7 @@ impl Roll {
     }
 }
 
-/// The canonical response's frame in the canonical path's: it is entered through the last heading.
+/// The frame of the canonical response in the frame of the canonical path, whose last heading enters the receiver.
 pub fn response_frame(word: &Word) -> CubeSymmetry {
     CubeSymmetry::exchange(2, word.last_heading().axis())
 }

@@ -1,12 +1,12 @@
-//! Carries each block's light through openings to all others: `T_b->r` (Loos et al. 2011,
-//! section 6.3).
+//! Carries the light of each block through openings to all other blocks: `T_b->r` (Loos et al. 2011, section 6.3).
 //!
-//! A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of
-//! openings that turns back carries nothing and is left out; the paper follows all sequences. Either the
-//! dictionary's table has the operator of a whole sequence ([`table`]), or lightfields are passed on from opening
-//! to opening as in the paper ([`lightfield`]); sequences longer than the table's take the second way, if the
-//! dictionary has lightfields. Both give responses at the openings that light enters through, and those are projected
-//! on the joint basis of the block behind, where the paper keeps a basis for each opening.
+//! Departures from the paper:
+//! 1. A straight ray through a grid uses at most one of each pair of opposite headings, so a sequence of openings that
+//!    turns back carries no light. Such sequences are left out; the paper follows all.
+//! 2. The dictionary's table has the operator of a whole sequence ([`table`]). Longer sequences pass lightfields on
+//!    from opening to opening as in the paper ([`lightfield`]), if the dictionary has lightfields.
+//! 3. Both give responses at the opening that light enters by. They are projected on the joint basis of the block
+//!    behind it; the paper keeps a basis for each opening.
 
 pub(crate) mod arrivals;
 pub(crate) mod context;
@@ -28,8 +28,8 @@ use crate::modular::propagate::table::Table;
 use crate::modular::scene::SceneData;
 use mrt_core::linalg::matrix::{Matrix, multiply, multiply_add};
 
-/// Assembles the operator from all blocks' coefficients b to all blocks' joint coefficients, which may take up to
-/// `max_bytes`.
+/// Assembles the operator from the coefficients b of all blocks to the joint coefficients of all blocks, which may take
+/// up to `max_bytes`.
 pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     scene: &SceneData,
     dictionary: &Dictionary<M>,
@@ -62,7 +62,7 @@ pub(crate) fn joint_from_coefficients<M: OperatorMatrix>(
     Ok(packer.finish())
 }
 
-/// Gives `visit` each block with what its light becomes at the openings that it enters others by.
+/// Calls `visit` with each block, and with the responses to its light at the openings that it enters other blocks by.
 pub(crate) fn follow_all<M: OperatorMatrix>(
     context: &PropagationContext<'_, M>,
     mut visit: impl FnMut(BlockIndex, Arrivals) -> Result<(), AssembleError>,
@@ -76,10 +76,11 @@ pub(crate) fn follow_all<M: OperatorMatrix>(
     let blocks = &context.scene.level.blocks;
     let has_hole = |opening: &Aperture| hole_of(opening.outline).is_some();
     let mut openings = blocks.iter().flat_map(|block| block.shape.openings);
-    // How many counts of holes the paths of the scene may have, for the table's depths.
+    // The table has a depth for paths without a hole, with one, and with more; only levels with holes need the last
+    // two.
     let holes = if openings.any(has_hole) { 3 } else { 1 };
     let goes_on = covered[..holes].iter().any(|&d| d < config.max_depth);
-    // A dictionary that was packed without lightfields ends where its table does.
+    // With a dictionary that was packed without lightfields, light ends where the table does.
     let has_fields = !dictionary.lightfields.parity.is_empty();
     let fields = (goes_on && has_fields).then(|| dictionary.lightfields.decode());
     for source in (0..blocks.len()).map(BlockIndex::new) {
@@ -102,7 +103,7 @@ pub(crate) fn follow_all<M: OperatorMatrix>(
     Ok(())
 }
 
-/// What one block's light becomes in another, behind the same doors.
+/// The light of one block in another, for all paths through the same doors.
 struct JointArrival {
     /// Doors on the way, ascending.
     doors: Vec<u32>,
@@ -111,7 +112,7 @@ struct JointArrival {
     joint: Matrix<f32>,
 }
 
-/// Projects responses on the joint bases, and sums those of one block behind the same doors.
+/// Projects responses on joint bases, and sums those that enter the same block through the same doors.
 fn project(
     context: &PropagationContext<'_, impl OperatorMatrix>,
     arrivals: Arrivals,

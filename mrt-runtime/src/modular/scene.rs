@@ -1,4 +1,4 @@
-//! What frames read: a level joined with a dictionary, packed and immutable.
+//! A scene: a level joined with a dictionary, packed for frames and immutable.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::PlacedLevel;
@@ -6,12 +6,13 @@ use crate::modular::packed::{PackedShape, PackedTransport};
 use crate::output::lightmap_atlas::LightmapAtlas;
 use crate::output::texel_layout::{BlockRank, TexelGeometry, TexelLayout};
 use glam::{DMat3, Vec3};
+use mrt_core::geometry::cube::Face;
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
-/// A level ready for frames. Made by [`Scene::assemble`]; never changes afterwards.
+/// A level joined with a dictionary, ready for frames. Made by [`Scene::assemble`]; it never changes.
 ///
-/// Clones share one set of data, so a scene costs nothing to hand to another thread or to a second frame.
+/// A clone shares the data, so giving a scene to another thread or a second frame costs nothing.
 #[derive(Clone, Debug)]
 pub struct Scene(Arc<SceneData>);
 
@@ -20,9 +21,21 @@ impl Scene {
         Self(Arc::new(data))
     }
 
-    /// True if both are the same scene, not merely equal ones.
+    /// True if both share their data: one is a clone of the other.
     pub fn is_same(&self, other: &Scene) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
+    }
+
+    /// Texels along an edge of a wall.
+    pub fn resolution(&self) -> usize {
+        self.level.resolution
+    }
+
+    /// Index within a block of the texel at (row along v, column along u) of a face of the turned cube, as
+    /// [`Frame::indirect_at`](crate::modular::frame::Frame::indirect_at) takes it; `None` for openings, and for blocks
+    /// and texels that do not exist.
+    pub fn texel(&self, block: BlockIndex, face: Face, row: usize, column: usize) -> Option<usize> {
+        self.level.level_texel(block, face, row, column)
     }
 }
 
@@ -36,66 +49,67 @@ impl Deref for Scene {
 
 /// The data of a [`Scene`].
 ///
-/// Everything inside a block is in its canonical frame: faces, texels and warps already contain the orientation.
+/// Faces, texels and warps of a block are in its canonical frame: the orientation is part of the warp.
 #[derive(Clone, Debug)]
 pub struct SceneData {
     /// Blocks, openings and doors.
     pub level: PlacedLevel,
-    /// What modular transport adds to each block, in the level's order.
+    /// Data of modular transport for each block, in the level's order.
     pub blocks: Vec<SceneBlock>,
-    /// Operators of each shape that the level uses, as kernels read them.
+    /// Packed operators of each shape that the level uses.
     pub shapes: Vec<PackedShape>,
-    /// Where frames keep texels.
+    /// Layout of texels in frames.
     pub layout: TexelLayout,
-    /// Where frames keep coefficients.
+    /// Layout of coefficients in frames.
     pub rows: CoefficientLayout,
-    /// Where texels are.
+    /// Positions and normals of texels.
     pub texels: TexelGeometry,
     /// `T_b->r`: from the coefficients b of all blocks to the joint coefficients of all blocks.
     pub transport: PackedTransport,
     /// Probes along an edge of a block; 0 if the dictionary has none.
     pub probes: usize,
-    /// Where each wall's texels go in the lightmap.
+    /// Layout of the lightmap.
     pub atlas: LightmapAtlas,
 }
 
-/// What modular transport knows of a block.
+/// Data of modular transport for a block.
 #[derive(Clone, Debug)]
 pub struct SceneBlock {
     /// Index into [`SceneData::shapes`].
     pub shape_index: usize,
-    /// Its part of the coefficients b.
+    /// Range of the block's coefficients b among those of all blocks.
     pub coefficients: Range<usize>,
-    /// Its part of the joint coefficients; the first of them take its own coefficients b.
+    /// Range of the block's joint coefficients among those of all blocks. The first of them take the block's own
+    /// coefficients b.
     pub joint: Range<usize>,
-    /// Takes the axes of the block's probes to the world's: an orthogonal matrix.
+    /// Orthogonal matrix from the axes of the block's probes to those of the world.
     pub world_from_probe: DMat3,
 }
 
-/// How frames keep coefficients: as many rows for every block, channel by channel.
+/// The layout of coefficients in a frame's memory: the same number of rows for every block, channel by channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CoefficientLayout {
-    /// Coefficients that each block has room for, a channel: those of the shape with the most
-    /// [`rows`](PackedShape::rows), and padding that stays zero.
+    /// Rows of a block in each channel: at least the [`rows`](PackedShape::rows) of every shape, with padding that
+    /// stays zero.
     pub count: usize,
-    /// By shape: the row of each coefficient b.
+    /// By shape: for each coefficient b, its row.
     pub row_of_mode: Vec<Vec<u16>>,
 }
 
 impl CoefficientLayout {
-    /// Coefficients of a block, three channels.
+    /// Number of rows of a block in all three channels.
     pub fn per_block(&self) -> usize {
         3 * self.count
     }
 
-    /// Where a block's coefficients are among those of all blocks.
+    /// Range of a block's rows among those of all blocks.
     pub fn of_block(&self, rank: BlockRank) -> Range<usize> {
         rank.get() * self.per_block()..(rank.get() + 1) * self.per_block()
     }
 }
 
 impl SceneData {
-    /// True if every shape has vector irradiance.
+    /// True if all blocks have vector irradiance.
     pub fn has_vector(&self) -> bool {
         self.level
             .blocks
@@ -112,7 +126,7 @@ impl SceneData {
         self.level.texel_count()
     }
 
-    /// The slot of a texel, counted over all blocks; `None` if there is no such texel.
+    /// The slot of texel number `texel`, counted over all blocks; `None` if there is no such texel.
     pub fn slot(&self, texel: usize) -> Option<usize> {
         let blocks = &self.level.blocks;
         let block = blocks.partition_point(|block| block.texels.end <= texel);
@@ -120,12 +134,12 @@ impl SceneData {
         self.layout.slot(BlockIndex::new(block), texel - first)
     }
 
-    /// World position, metres, of a texel, counted over all blocks; `None` if there is no such texel.
+    /// World position, metres, of texel number `texel`, counted over all blocks; `None` if there is no such texel.
     pub fn texel_position(&self, texel: usize) -> Option<Vec3> {
         Some(self.texels.positions.get(self.slot(texel)?))
     }
 
-    /// Unit normal into the block of a texel, counted over all blocks; `None` if there is no such texel.
+    /// Unit normal, into its block, of texel number `texel`, counted over all blocks; `None` if there is no such texel.
     pub fn texel_normal(&self, texel: usize) -> Option<Vec3> {
         Some(self.texels.normals.get(self.slot(texel)?))
     }

@@ -1,4 +1,4 @@
-//! The lightmap of a frame, and its pixels as textures take them.
+//! The lightmap of a frame, and its pixels in the formats of textures.
 
 use crate::level::block_index::BlockIndex;
 use crate::output::lightmap_atlas::{LightmapAtlas, Tile};
@@ -19,23 +19,23 @@ impl<'a> Lightmap<'a> {
         Self { atlas, pixels }
     }
 
-    /// Pixels a row.
+    /// Pixels in a row.
     pub fn width(&self) -> usize {
         self.atlas.width
     }
 
-    /// Rows.
+    /// Number of rows.
     pub fn height(&self) -> usize {
         self.atlas.height
     }
 
-    /// Row by row from the top; empty if the frame was not asked for a lightmap.
+    /// All pixels, row by row from the top; empty if the frame computes no lightmap.
     pub fn pixels(&self) -> &'a [[f32; 3]] {
         self.pixels
     }
 
-    /// Texture coordinates in [0, 1]² at which a bilinear filter reads the light at (u, v) in [0, 1]² of a block's canonical
-    /// wall; `None` for openings and blocks that do not exist.
+    /// Texture coordinates in [0, 1]² at which a bilinear filter reads the light at (u, v) in [0, 1]² of a block's
+    /// canonical wall; `None` for openings and blocks that do not exist.
     pub fn texture_coordinate(
         &self,
         block: BlockIndex,
@@ -46,14 +46,15 @@ impl<'a> Lightmap<'a> {
         self.atlas.texture_coordinate(block, wall, u, v)
     }
 
-    /// Irradiance at texture coordinates in [0, 1]², as a bilinear filter reads it; 0 without a lightmap.
+    /// Irradiance, W/m², that a bilinear filter reads at texture coordinates in [0, 1]²; 0 without a lightmap.
     pub fn sample(&self, coordinate: Vec2) -> [f32; 3] {
         let size = Vec2::new(self.width() as f32, self.height() as f32);
         self.atlas.sample(self.pixels, coordinate * size)
     }
 
-    /// Writes a tile as half-precision numbers with an alpha of 1, row by row: `size`² pixels of `RGBA16F`. Values above
-    /// 65,504 become that. What `out` held is replaced; it stays empty for a tile that is not in the image.
+    /// Writes a tile as half-precision numbers with an alpha of 1, row by row: `size`² pixels of `RGBA16F`. Values
+    /// above 65,504 become 65,504. The content of `out` is replaced; a tile that is not in the image leaves `out`
+    /// empty.
     pub fn write_rgba16f(&self, tile: Tile, out: &mut Vec<[u16; 4]>) {
         const ONE: u16 = 0x3c00;
         out.clear();
@@ -64,9 +65,9 @@ impl<'a> Lightmap<'a> {
         out.extend(pixels);
     }
 
-    /// Writes a tile with a shared exponent, row by row: `size`² pixels of `RGB9E5`. Values above 65,408 become that; the
-    /// error is at most 1/1024 of a pixel's largest channel. What `out` held is replaced; it stays empty for a tile that is
-    /// not in the image.
+    /// Writes a tile with a shared exponent, row by row: `size`² pixels of `RGB9E5`. Values above 65,408 become 65,408.
+    /// The error is at most 1/511 of a pixel's largest channel, and 2^-25 where that is less. The content of `out` is
+    /// replaced; a tile that is not in the image leaves `out` empty.
     pub fn write_rgb9e5(&self, tile: Tile, out: &mut Vec<u32>) {
         out.clear();
         out.extend(self.pixels_of(tile).map(rgb9e5));

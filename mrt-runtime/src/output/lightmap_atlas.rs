@@ -1,9 +1,9 @@
-//! The padded lightmap atlas (Loos et al. 2011, section 6.2): one tile a wall, with a border of one texel
-//! that copies what a bilinear filter must see there.
+//! The padded lightmap atlas (Loos et al. 2011, section 6.2): one tile for each wall, with a border of one pixel for
+//! bilinear filters.
 //!
-//! Across an opening the border shows the neighbouring block's wall, so joined blocks have no seam; at
-//! creases inside a block it repeats the wall's own edge. The charts of a tube meet without a crease, and show
-//! one another.
+//! Across an opening, the border shows the wall of the neighbouring block, so joined blocks have no seam. At a crease
+//! inside a block, it repeats the wall's own edge. The charts of a tube meet without a crease, so their borders show
+//! each other.
 
 use crate::executor::{Executor, run_parts, task_count};
 use crate::level::block_index::BlockIndex;
@@ -13,30 +13,36 @@ use crate::output::texel_layout::{BlockRank, Planes, TexelLayout};
 use glam::{DVec3, Vec2};
 use mrt_core::geometry::cube::Face;
 
-/// Where each texel of a scene goes in the lightmap.
+/// The position of each texel of a scene in the lightmap.
 #[derive(Clone, Debug)]
 pub struct LightmapAtlas {
-    /// Pixels a row.
+    /// Pixels in a row.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// First pixel of each (block, wall) tile's border, by block and [`Face::index`].
+    /// By block and [`Face::index`]: the first pixel of the tile's border; `None` without a wall.
     tiles: Vec<[Option<[usize; 2]>; 6]>,
-    /// By tile, one a pixel, row by row: the slot that it shows, `u32::MAX` for none.
+    /// Tile by tile, pixel by pixel: the slot that the pixel shows; `u32::MAX` if it shows none.
     slots: Vec<u32>,
-    /// By place of a block: the tiles that show it are `shown[shown_by[k]..shown_by[k + 1]]`.
+    /// The block of rank k is shown by the tiles `shown[shown_by[k]..shown_by[k + 1]]`.
     shown: Vec<u32>,
     shown_by: Vec<u32>,
     resolution: usize,
+}
+
+/// A block, and a tile that shows some of its texels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Shows {
+    block: BlockRank,
+    tile: u32,
 }
 
 impl LightmapAtlas {
     /// Lays out the walls of all blocks in a nearly square image.
     pub(crate) fn new(level: &PlacedLevel, layout: &TexelLayout) -> Self {
         let blocks = &level.blocks[..];
-        let resolution = level.resolution;
         let wall_count: usize = blocks.iter().map(|block| block.shape.walls().count()).sum();
-        let tile = resolution + 2;
+        let tile = level.resolution + 2;
         let columns = (1..)
             .find(|c| c * c >= wall_count)
             .unwrap_or(wall_count)
@@ -49,48 +55,62 @@ impl LightmapAtlas {
             slots: Vec::with_capacity(wall_count * tile * tile),
             shown: Vec::new(),
             shown_by: Vec::new(),
-            resolution,
+            resolution: level.resolution,
         };
+        let mut shows = Vec::new();
         let mut next = 0;
-        // (rank of a block, tile that shows it)
-        let mut shows: Vec<(BlockRank, u32)> = Vec::new();
         for (index, block) in blocks.iter().enumerate() {
             for face in block.shape.walls() {
                 let origin = [next % columns * tile, next / columns * tile];
                 atlas.tiles[index][face.index()] = Some(origin);
-                let first = shows.len();
-                for row in 0..tile {
-                    for column in 0..tile {
-                        let place = [column as isize - 1, row as isize - 1];
-                        let seen = texel_seen(blocks, index, face, place, resolution);
-                        let slot = seen.and_then(|(block, texel)| {
-                            let rank = layout.rank[block];
-                            if !shows[first..].contains(&(rank, next as u32)) {
-                                shows.push((rank, next as u32));
-                            }
-                            layout.slot(BlockIndex::new(block), texel)
-                        });
-                        atlas.slots.push(slot.map_or(u32::MAX, |slot| slot as u32));
-                    }
-                }
+                atlas.push_tile(blocks, layout, (index, face), &mut shows);
                 next += 1;
             }
         }
-        shows.sort_unstable();
-        let mut at = 0;
-        for rank in layout.ranks() {
-            atlas.shown_by.push(at as u32);
-            while at < shows.len() && shows[at].0 == rank {
-                atlas.shown.push(shows[at].1);
-                at += 1;
-            }
-        }
-        atlas.shown_by.push(at as u32);
+        atlas.index_shown(layout, shows);
         atlas
     }
 
-    /// Pixel coordinates (x to the right, y down the rows, pixel centres at halves) at which a bilinear
-    /// filter reads the light at (u, v) in [0, 1]² of a block's canonical wall; `None` for openings.
+    /// Appends the slots that the tile of a block's wall shows, and to `shows` the blocks that it shows.
+    fn push_tile(
+        &mut self,
+        blocks: &[PlacedBlock],
+        layout: &TexelLayout,
+        (block, wall): (usize, Face),
+        shows: &mut Vec<Shows>,
+    ) {
+        let tile = self.tile_count() as u32;
+        let size = self.tile_size();
+        let first = shows.len();
+        for row in 0..size {
+            for column in 0..size {
+                let place = [column as isize - 1, row as isize - 1];
+                let seen = texel_seen(blocks, block, wall, place, self.resolution);
+                let slot = seen.and_then(|(block, texel)| {
+                    let rank = layout.rank[block];
+                    if !shows[first..].iter().any(|shows| shows.block == rank) {
+                        shows.push(Shows { block: rank, tile });
+                    }
+                    layout.slot(BlockIndex::new(block), texel)
+                });
+                self.slots.push(slot.map_or(u32::MAX, |slot| slot as u32));
+            }
+        }
+    }
+
+    /// Lists, by block, the tiles that show it.
+    fn index_shown(&mut self, layout: &TexelLayout, mut shows: Vec<Shows>) {
+        shows.sort_unstable();
+        for rank in layout.ranks() {
+            let start = shows.partition_point(|shows| shows.block < rank);
+            self.shown_by.push(start as u32);
+        }
+        self.shown_by.push(shows.len() as u32);
+        self.shown.extend(shows.iter().map(|shows| shows.tile));
+    }
+
+    /// Pixel coordinates (x to the right, y downwards, pixel centres at halves) at which a bilinear filter reads the
+    /// light at (u, v) in [0, 1]² of a block's canonical wall; `None` for openings and blocks that do not exist.
     pub fn pixel(&self, block: BlockIndex, face: Face, u: f32, v: f32) -> Option<Vec2> {
         let [x, y] = self.tiles.get(block.get())?[face.index()]?;
         let scale = self.resolution as f32;
@@ -98,7 +118,7 @@ impl LightmapAtlas {
         Some(Vec2::new(x as f32 + 1.0, y as f32 + 1.0) + inside)
     }
 
-    /// [`LightmapAtlas::pixel`] over the image's size: texture coordinates in [0, 1]².
+    /// [`LightmapAtlas::pixel`] divided by the size of the image: texture coordinates in [0, 1]².
     pub fn texture_coordinate(
         &self,
         block: BlockIndex,
@@ -110,10 +130,10 @@ impl LightmapAtlas {
         Some(self.pixel(block, face, u, v)? / size)
     }
 
-    /// Bilinear lookup in an image of this layout at pixel coordinates from [`LightmapAtlas::pixel`]; zero in an image of
-    /// another size.
+    /// Bilinear lookup, at pixel coordinates from [`LightmapAtlas::pixel`], in an image of this layout; 0 if the image
+    /// has another size.
     pub fn sample(&self, image: &[[f32; 3]], pixel: Vec2) -> [f32; 3] {
-        // A level of open blocks alone has no walls.
+        // A level of open blocks only has no walls.
         if self.width == 0 || self.height == 0 || image.len() != self.width * self.height {
             return [0.0; 3];
         }
@@ -132,24 +152,17 @@ impl LightmapAtlas {
         })
     }
 
-    /// Number of tiles: one a wall.
+    /// Number of tiles: one for each wall.
     pub fn tile_count(&self) -> usize {
-        let tile = self.resolution + 2;
-        self.slots.len() / (tile * tile)
+        self.slots.len() / (self.tile_size() * self.tile_size())
     }
 
-    /// Where a tile stands in the image; `None` if there is no such tile.
+    /// Position of a tile in the image; `None` if there is no such tile.
     pub fn tile(&self, index: usize) -> Option<Tile> {
-        let size = self.resolution + 2;
-        let columns = self.width / size;
-        (index < self.tile_count()).then(|| Tile {
-            x: index % columns * size,
-            y: index / columns * size,
-            size,
-        })
+        (index < self.tile_count()).then(|| Tile::of_grid(index, self.columns(), self.tile_size()))
     }
 
-    /// Tiles a row.
+    /// Tiles in a row.
     pub(crate) fn columns(&self) -> usize {
         self.width / self.tile_size()
     }
@@ -159,12 +172,13 @@ impl LightmapAtlas {
         self.resolution + 2
     }
 
-    /// Length that a list of tiles may have in [`LightmapAtlas::fill`].
+    /// Longest list of tiles, duplicates included, that [`LightmapAtlas::fill`] makes.
     pub(crate) fn tile_list_size(&self) -> usize {
         self.shown.len()
     }
 
-    /// Copies texels to the tiles that show the changed blocks; `tiles` is room for their list.
+    /// Copies texels to the tiles that show the changed blocks, and writes the list of those tiles, ascending, to
+    /// `tiles`.
     pub(crate) fn fill(
         &self,
         changed: &[BlockRank],
@@ -184,8 +198,8 @@ impl LightmapAtlas {
         let (Some(&first), Some(&last)) = (tiles.first(), tiles.last()) else {
             return;
         };
-        let tile = self.resolution + 2;
-        let columns = (self.width / tile) as u32;
+        let tile = self.tile_size();
+        let columns = self.columns() as u32;
         let rows = (first / columns) as usize..(last / columns) as usize + 1;
         let tasks = task_count(executor, rows.len());
         let channels = texels.channels();
@@ -219,7 +233,7 @@ impl LightmapAtlas {
 fn copy_row(slots: &[u32], [red, green, blue]: [&[f32]; 3], pixels: &mut [[f32; 3]]) {
     for (pixel, &slot) in pixels.iter_mut().zip(slots) {
         let slot = slot as usize;
-        // Pixels that show nothing stay as they are.
+        // Pixels that show no slot stay as they are.
         if let (Some(&r), Some(&g), Some(&b)) = (red.get(slot), green.get(slot), blue.get(slot)) {
             *pixel = [r, g, b];
         }
@@ -237,25 +251,37 @@ pub struct Tile {
     pub size: usize,
 }
 
-/// A point in the plane of a block's wall, inside it or up to a texel beside it.
+impl Tile {
+    /// Number `index` in a grid of tiles, row by row.
+    pub(crate) fn of_grid(index: usize, columns: usize, size: usize) -> Self {
+        Self {
+            x: index % columns * size,
+            y: index / columns * size,
+            size,
+        }
+    }
+}
+
+/// A point in the plane of a block's wall, inside the wall or up to a texel beside it.
 #[derive(Clone, Copy)]
 struct Place {
     block: usize,
     wall: Face,
-    /// In the block's canonical cube.
+    /// The point in the block's canonical cube.
     point: DVec3,
 }
 
-/// How far beyond an opening, in u, a tube's border looks for the neighbour's first texel.
+/// Distance, in u, beyond an opening at which the border of a tube's tile looks for the neighbour's first texel.
 const PAST: f64 = 1e-6;
 
-/// The texel, as (block, index in it), that column and row of a wall show, both in -1..=resolution: one
-/// step outside is the neighbour's wall across an opening, or the nearest texel inside at a crease.
+/// The texel, as (block, index in the block), that a tile shows at (column, row), both in -1..=resolution. One step
+/// outside the wall, it is in the neighbour's wall across an opening, or the nearest texel of the wall itself at a
+/// crease.
 ///
-/// Up to four blocks meet where two openings of a block do, and all of their tiles must give the same
-/// mean there. With four, each tile shows all four. Around a pillar there are three, and each tile shows
-/// the middle one twice: the middle one's at its corner, the others' beside it, at their crease with the
-/// pillar.
+/// Up to four blocks meet at the corner between two openings of a block, and a filter must read the same mean there
+/// from all of their tiles. With four blocks, each tile shows all four. Around a pillar there are three, and each tile
+/// shows the middle block twice: the middle block's own tile in its corner pixel, the other two tiles in the pixel
+/// beside it, at their crease with the pillar.
 fn texel_seen(
     blocks: &[PlacedBlock],
     block: usize,
@@ -265,7 +291,7 @@ fn texel_seen(
 ) -> Option<(usize, usize)> {
     let center = |k: isize| (k as f64 + 0.5) / resolution as f64;
     if let Some(form) = blocks[block].shape.tube() {
-        // Just past an opening, not half a texel: the neighbour's texels may be far shorter.
+        // Just past the opening, not half a texel: the neighbour's texels may be far shorter.
         let (u, v) = (center(column).clamp(-PAST, 1.0 + PAST), center(row));
         return texel_seen_in_tube(blocks, block, form.surface(face, u, v).position, resolution);
     }
@@ -297,10 +323,10 @@ fn texel_seen(
     Some((seen.block, offset + texel))
 }
 
-/// The texel of a tube's wall at a point, or that of the tube beyond an opening that the point is past.
+/// The texel of a tube's wall at a point. If the point is past an opening, it is a texel of the tube beyond.
 ///
-/// Charts are quarters of the section in every tube, and joined openings are the same disc: rows of texels go on
-/// from tube to tube and around each.
+/// The charts of every tube are quarters of its section, and joined openings are the same disc, so rows of texels
+/// continue from tube to tube and around each tube.
 fn texel_seen_in_tube(
     blocks: &[PlacedBlock],
     block: usize,
@@ -332,7 +358,7 @@ fn texel_seen_in_tube(
     Some((block, shape.wall_offset(chart, resolution)? + texel))
 }
 
-/// The texel at a point, or the nearest that is wall where there is a hole.
+/// The texel of a wall at a point; if it is in a hole, the nearest texel that is not.
 fn texel_of_wall(shape: &Shape, wall: Face, point: DVec3, resolution: usize) -> usize {
     let texel = wall.texel_index(point, resolution);
     let center = |k: usize| wall.texel_center(resolution, k / resolution, k % resolution);
@@ -348,12 +374,13 @@ fn texel_of_wall(shape: &Shape, wall: Face, point: DVec3, resolution: usize) -> 
         .unwrap_or(texel)
 }
 
-/// The side that an outermost texel touches.
+/// The side, along `axis`, that the texel in row or column `k` touches; `None` for inner texels.
 fn corner(axis: usize, k: isize, last: isize) -> Option<Face> {
     (k == 0 || k == last).then(|| Face::from_axis(axis, k > 0))
 }
 
-/// What a pixel beyond `side` shows; `corner` is the side that it is nearest to, if it is at the end.
+/// The point that a pixel beyond `side` shows. `corner` is the other side that the pixel is next to, if it is at an
+/// end.
 fn beside(blocks: &[PlacedBlock], here: Place, side: Face, corner: Option<Face>) -> Place {
     if let (1, place) = walk(blocks, here, [side]) {
         return place;
@@ -367,8 +394,8 @@ fn beside(blocks: &[PlacedBlock], here: Place, side: Face, corner: Option<Face>)
     }
 }
 
-/// Follows a wall over `sides`, as `from` names them, up to the first that does not lead on; returns how many
-/// were crossed, and the same point as the last block sees it.
+/// Follows a wall into the next block across each of `sides`, named as in the block of `from`, up to the first side
+/// that does not lead on. Returns how many sides were crossed, and the point in the last block.
 fn walk<const N: usize>(
     blocks: &[PlacedBlock],
     from: Place,
@@ -386,7 +413,7 @@ fn walk<const N: usize>(
             return (k, here);
         };
         let block = block.get();
-        // Around a hole there is a wall between the blocks.
+        // A side with a hole has a wall around it.
         if !blocks[here.block].shape.is_open(side) {
             return (k, here);
         }
@@ -398,7 +425,7 @@ fn walk<const N: usize>(
         here = Place {
             block,
             wall,
-            // The neighbour's cube stands one width further on.
+            // The neighbour's cube is one width further on.
             point: there_from_here.point(here.point - side.outward()),
         };
         sides = sides.map(|side| there_from_here.face(side));

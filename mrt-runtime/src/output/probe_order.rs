@@ -1,19 +1,19 @@
-//! How much of the directions of light probes keep.
+//! The order of the spherical harmonics of probes.
 
-/// Coefficients of a probe: bands 0 to 2.
+/// Most coefficients of a probe: bands 0 to 2.
 pub const PROBE_COEFFICIENTS: usize = 9;
 
-/// How much of the light's directions probes keep.
+/// Order of a probe's spherical harmonics: how well it tells the directions of light apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ProbeOrder {
-    /// Four coefficients: bands 0 and 1.
+    /// Bands 0 and 1: four coefficients.
     L1,
-    /// Nine: bands 0 to 2.
+    /// Bands 0 to 2: nine coefficients.
     L2,
 }
 
 impl ProbeOrder {
-    /// Coefficients of a probe.
+    /// Number of coefficients of a probe.
     pub fn coefficients(self) -> usize {
         match self {
             ProbeOrder::L1 => 4,

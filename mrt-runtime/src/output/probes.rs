@@ -1,7 +1,7 @@
-//! Probes: incident indirect light on a grid in every block, for things that move (Loos et al. 2011, section 6.5).
+//! Probes: incident indirect light on a grid in every block, for moving objects (Loos et al. 2011, section 6.5).
 //!
-//! A probe holds spherical harmonics of incident radiance in world axes, from the same joint coefficients as the
-//! walls, so both show the same light. Between probes the light is interpolated, across openings too.
+//! A probe holds spherical harmonics of incident radiance in world axes. They come from the same joint coefficients as
+//! the light of the walls. Between probes, light is interpolated, across openings too.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedLevel};
@@ -12,7 +12,7 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sh;
 use mrt_core::simd::{Kernel, Lanes, SimdLevel};
 
-/// Matrices that turn bands 1 and 2, row by row; band 0 stays.
+/// Matrices that rotate bands 1 and 2, row by row; rotation does not change band 0.
 type BandRotations = [[f32; 5]; 3 + 5];
 
 fn band_rotations(rotation: &DMat3) -> BandRotations {
@@ -28,7 +28,8 @@ fn band_rotations(rotation: &DMat3) -> BandRotations {
     rows
 }
 
-/// Turns all probes of a block: `to = bands * from`, both channel by channel, in that coefficient by coefficient.
+/// Rotates all probes of a block: `to = bands * from`. Both are stored channel by channel, in a channel coefficient by
+/// coefficient, for each coefficient probe by probe.
 struct Turn<'a> {
     bands: &'a BandRotations,
     coefficients: usize,
@@ -76,21 +77,22 @@ impl Kernel for Turn<'_> {
 
 /// The probes of a scene after a frame.
 ///
-/// Storage is block by block; in a block probe by probe, x fastest, then y, then z in the canonical cube at
-/// (i + 0.5) / n; in a probe coefficient by coefficient, RGB each.
+/// They are stored block by block; in a block probe by probe, x fastest, then y, then z, at (i + 0.5) / n of the
+/// canonical cube; in a probe coefficient by coefficient, with RGB for each.
 #[derive(Clone, Debug)]
 pub struct Probes {
     order: ProbeOrder,
     per_axis: usize,
     values: Vec<[f32; 3]>,
-    /// Light of one block in its own axes, then in the world's: channel by channel, coefficient by coefficient.
+    /// Light of one block in its own axes, then in world axes; see [`Turn`] for the order.
     scratch: Vec<f32>,
-    /// To world axes, by block.
+    /// By block: the rotation to world axes.
     rotations: Vec<BandRotations>,
 }
 
 impl Probes {
-    /// Dark probes, `per_axis`³ a block; `world_from_probe` takes the axes of each block's probes to the world's.
+    /// Dark probes, `per_axis`³ in each block. `world_from_probe` gives, for each block, the matrix from the axes of
+    /// its probes to those of the world.
     pub(crate) fn new(
         order: ProbeOrder,
         per_axis: usize,
@@ -107,7 +109,7 @@ impl Probes {
         }
     }
 
-    /// How many coefficients each probe has.
+    /// Order of each probe, which gives its number of coefficients.
     pub fn order(&self) -> ProbeOrder {
         self.order
     }
@@ -122,7 +124,7 @@ impl Probes {
         &self.values
     }
 
-    /// The coefficients of one block, as [`Probes::values`] has them; empty if there is no such block.
+    /// The part of [`Probes::values`] of one block; empty if there is no such block.
     pub fn of_block(&self, block: BlockIndex) -> &[[f32; 3]] {
         let size = self.per_axis.pow(3) * self.order.coefficients();
         let start = block.get().saturating_mul(size);
@@ -131,19 +133,20 @@ impl Probes {
             .unwrap_or(&[])
     }
 
-    /// Writes all coefficients as the bits of half-precision numbers, in the same order: what a texture takes. Values
-    /// beyond 65,504 become that. What `out` held is replaced.
+    /// Writes all coefficients, in the same order, as bits of half-precision numbers for a texture. Values beyond
+    /// ±65,504 become ±65,504. The content of `out` is replaced.
     pub fn write_f16(&self, out: &mut Vec<[u16; 3]>) {
         out.clear();
         out.extend(self.values.iter().map(|value| value.map(f16_bits)));
     }
 
+    /// Sets all probes to 0.
     pub(crate) fn darken(&mut self) {
         self.values.fill([0.0; 3]);
     }
 
-    /// Takes the light of one block in its own axes, which `expand` writes: channel by channel, in that coefficient by
-    /// coefficient, in that probe by probe.
+    /// Replaces the probes of one block. `expand` writes their light in the block's own axes: for each channel
+    /// coefficient by coefficient, for each coefficient probe by probe.
     pub(crate) fn update(
         &mut self,
         block: BlockIndex,
@@ -174,9 +177,9 @@ impl Probes {
         }
     }
 
-    /// Light at a point of the world: trilinear between the probes around it, those of joined blocks included;
-    /// `None` outside all blocks. Coefficients beyond the probes' order are zero. Doors count as open: half a probe's
-    /// spacing next to one, light is a mean of both sides.
+    /// Light at a world position, metres: trilinear between the eight probes around it, those of joined blocks
+    /// included; `None` outside all blocks. Coefficients beyond the order of the probes are zero. Doors count as open:
+    /// within half the spacing of probes from a door, the result mixes the light of both sides.
     pub fn at(&self, level: &PlacedLevel, point: DVec3) -> Option<[[f32; 3]; PROBE_COEFFICIENTS]> {
         let block = level.block_at(point)?;
         let unit = level.block(block)?.warp.inverse(point)?;
@@ -201,8 +204,8 @@ impl Probes {
         Some(sum)
     }
 
-    /// A probe by its place in a block's grid, which may be one step outside: then it is the neighbour's
-    /// across an opening, and the nearest inside at a wall.
+    /// The probe at a position of a block's grid. One step outside the grid, it is the neighbour's probe across an
+    /// opening, or the nearest probe inside at a wall.
     fn probe(&self, level: &PlacedLevel, block: BlockIndex, place: DVec3) -> &[[f32; 3]] {
         let n = self.per_axis as f64;
         let mut block = block;
@@ -238,7 +241,8 @@ impl Probes {
     }
 }
 
-/// Irradiance, W/m², on a surface of unit `normal` under a probe's light; what truncation leaves negative is zero.
+/// Irradiance, W/m², on a surface of unit `normal` under a probe's light. Where truncation makes it negative, the
+/// result is 0.
 pub fn irradiance_from_probe(coefficients: &[[f32; 3]], normal: Vec3) -> Vec3 {
     let channel = |c: usize| {
         let mut radiance = [0.0f32; PROBE_COEFFICIENTS];

@@ -1,43 +1,44 @@
-//! Where frames keep the texels of a level: blocks of one shape one after another, each texel in a **slot**, channels apart.
+//! The layout of texels in a frame's memory. Blocks of one shape follow each other, and each texel has a **slot** in
+//! its block. The three colour channels are stored apart.
 
 use crate::level::block_index::BlockIndex;
 use glam::Vec3;
 use mrt_core::simd::Aligned;
 use std::ops::Range;
 
-/// A block by its position in a [`TexelLayout`], which is how frames count blocks.
+/// A block by its position in a [`TexelLayout`]: the order in which frames store blocks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BlockRank(u32);
 
 impl BlockRank {
-    /// The block at this position of a layout, of which levels have fewer than `u32::MAX`.
+    /// The block at `position`, which must be below `u32::MAX`, as it is in every level.
     pub const fn new(position: usize) -> Self {
         Self(position as u32)
     }
 
-    /// Its position in the layout.
+    /// Position of the block in the layout.
     pub const fn get(self) -> usize {
         self.0 as usize
     }
 }
 
-/// The order in which frames keep blocks, and the slots of their texels.
+/// The order in which frames store blocks, and the slots of their texels.
 ///
-/// Blocks of one shape stand one after another, so that a shape's operators stay in the cache from block to block.
+/// Blocks of one shape follow each other, so that the operators of the shape stay in the cache from block to block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TexelLayout {
-    /// By rank: the block of the level.
+    /// By rank: the index of the block in the level.
     pub order: Vec<BlockIndex>,
-    /// By block of the level: its rank.
+    /// By index in the level: the rank of the block.
     pub rank: Vec<BlockRank>,
     /// By rank: the block's slots.
     pub slots: Vec<Range<usize>>,
-    /// By rank: index of the block's shape in the lists of the scene, and in those below.
+    /// By rank: the index of the block's shape in the lists of the scene and in the two lists below.
     pub shapes: Vec<u32>,
-    /// By shape: the first slot of each texel, within the block.
+    /// By shape: for each texel, its first slot within the block.
     pub slot_of_texel: Vec<Vec<u32>>,
-    /// By shape: the texel in each slot of the block; `u32::MAX` where there is none. A texel that lies on a mirror of the
-    /// shape has several slots.
+    /// By shape: for each slot of the block, its texel; `u32::MAX` for a slot without a texel. A texel on the plane of
+    /// a mirror of the shape has several slots.
     pub texel_of_slot: Vec<Vec<u32>>,
 }
 
@@ -57,7 +58,7 @@ impl TexelLayout {
         self.slots.last().map_or(0, |range| range.end)
     }
 
-    /// Most slots of a block.
+    /// Number of slots of the block that has the most.
     pub fn most_slots(&self) -> usize {
         self.slots.iter().map(Range::len).max().unwrap_or(0)
     }
@@ -78,7 +79,7 @@ impl TexelLayout {
         self.slots[rank.get()].clone()
     }
 
-    /// Slots from the first block's to the last one's, ends included.
+    /// Slots of all blocks whose ranks are in `span`, which must not be empty.
     pub(crate) fn slots_of_span(&self, span: &Range<usize>) -> Range<usize> {
         self.slots[span.start].start..self.slots[span.end - 1].end
     }
@@ -90,7 +91,8 @@ impl TexelLayout {
         Some(self.slots[rank.get()].start + slot as usize)
     }
 
-    /// A signal by slot in the level's order: block by block, in a block channel by channel, in a channel texel by texel.
+    /// Replaces `out` by a signal in the level's order: block by block, in a block channel by channel, in a channel
+    /// texel by texel.
     pub(crate) fn copy_by_texel(&self, signal: &Planes, out: &mut Vec<f32>) {
         out.clear();
         for &rank in &self.rank {
@@ -102,7 +104,8 @@ impl TexelLayout {
     }
 }
 
-/// Where the texels of a level are, by slot. Slots without a texel stand in the middle of their block and have no normal.
+/// Positions and normals of the texels of a level, by slot. A slot without a texel has the middle of its block as its
+/// position, and the normal 0.
 #[derive(Clone, Debug)]
 pub struct TexelGeometry {
     /// World positions, metres.
@@ -111,7 +114,7 @@ pub struct TexelGeometry {
     pub normals: Planes,
 }
 
-/// Three numbers a slot, channels apart.
+/// Three numbers for each slot, stored as three channels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planes {
     values: Aligned<f32>,
@@ -119,7 +122,7 @@ pub struct Planes {
 }
 
 impl Planes {
-    /// Zeros.
+    /// Zeros in `slots` slots.
     pub(crate) fn new(slots: usize) -> Self {
         Self {
             values: Aligned::zeroed(3 * slots),
@@ -132,38 +135,40 @@ impl Planes {
         self.slots
     }
 
-    /// All three channels.
+    /// The three channels of all slots.
     pub(crate) fn channels(&self) -> [&[f32]; 3] {
         self.block(0..self.slots)
     }
 
-    /// The three channels of a block.
+    /// The three channels of a range of slots.
     pub fn block(&self, slots: Range<usize>) -> [&[f32]; 3] {
         std::array::from_fn(|c| &self.values[c * self.slots..(c + 1) * self.slots][slots.clone()])
     }
 
-    /// Zeros everywhere.
+    /// Sets all numbers to 0.
     pub(crate) fn clear(&mut self) {
         self.values.fill(0.0);
     }
 
-    /// All three channels, to write.
+    /// The three channels of all slots, to write.
     pub(crate) fn channels_mut(&mut self) -> [&mut [f32]; 3] {
         let (first, rest) = self.values.split_at_mut(self.slots);
         let (second, third) = rest.split_at_mut(self.slots);
         [first, second, third]
     }
 
+    /// The three channels of a range of slots, to write.
     pub(crate) fn block_mut(&mut self, slots: Range<usize>) -> [&mut [f32]; 3] {
         self.channels_mut()
             .map(|channel| &mut channel[slots.clone()])
     }
 
+    /// The three numbers of a slot.
     pub(crate) fn get(&self, slot: usize) -> Vec3 {
         Vec3::from_array(std::array::from_fn(|c| self.values[c * self.slots + slot]))
     }
 
-    /// The value of all slots that have a texel, if they have the same.
+    /// The common value of all slots with a texel; `None` if they differ.
     pub(crate) fn uniform(&self, slots: Range<usize>, texel_of_slot: &[u32]) -> Option<Vec3> {
         let texels = slots
             .zip(texel_of_slot)
@@ -173,6 +178,7 @@ impl Planes {
         values.all(|value| value == first).then_some(first)
     }
 
+    /// Sets the three numbers of a slot.
     pub(crate) fn set(&mut self, slot: usize, value: Vec3) {
         for (c, x) in value.to_array().into_iter().enumerate() {
             self.values[c * self.slots + slot] = x;

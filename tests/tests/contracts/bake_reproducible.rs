@@ -1,59 +1,46 @@
-//! The same settings give the same bytes: as committed, on any number of threads, or not at all.
+//! A bake gives the same bytes for the same settings, on any number of threads, or no bytes when it is cancelled.
 
 use mrt_core::storage::Storage;
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::{Cancelled, Progress};
-use mrt_tests::DEFAULT_BYTES;
+use mrt_tests::{DEFAULT_BYTES, bake_of, changed, set_lightfields, with_threads};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// A bake of a second, with all of its stages.
+/// Settings of a bake that takes a second and has all stages.
 fn small() -> BakeConfig {
-    let mut config = BakeConfig::preset("mobile").expect("a preset");
-    config.resolution = 4;
-    config.modes = 10;
-    config.prior.lights_per_axis = 3;
-    config.lightfield.positions = 4;
-    config.lightfield.directions = 8;
-    config.lightfield.lightfield_modes = 24;
-    config.coupling.emission_modes = 12;
-    config.coupling.response_modes = 8;
-    config.coupling.foreign_modes = 4;
-    config.coupling.depth = 2;
-    config.check().expect("in range");
-    config
+    changed("mobile", "cubes-2d", |config| {
+        config.resolution = 4;
+        config.modes = 10;
+        config.prior.lights_per_axis = 3;
+        config.coupling.emission_modes = 12;
+        config.coupling.response_modes = 8;
+        config.coupling.foreign_modes = 4;
+        config.coupling.depth = 2;
+        set_lightfields(config, 4, 8, 24);
+    })
 }
 
 fn bytes(config: &BakeConfig) -> Vec<u8> {
-    bake(config, &Progress::silent())
-        .expect("nobody cancels")
-        .to_bytes()
-        .expect("six shapes fit a file")
+    bake_of(config).to_bytes().expect("six shapes fit a file")
 }
 
 #[test]
 fn the_committed_dictionary_is_what_the_bake_gives() {
     let config = BakeConfig::preset("standard").expect("a preset");
-    // Kept in half precision, which changes light by less than 0.03 %.
-    let baked = bake(&config, &Progress::silent())
-        .expect("nobody cancels")
+    // The committed file is stored in half precision, which changes light by less than 0.03 %.
+    let baked = bake_of(&config)
         .stored_as(Storage::F16)
         .to_bytes()
         .expect("six shapes fit a file");
-    // Megabytes of difference would not be readable.
+    // Only the first difference is printed, not megabytes of bytes.
     let first = baked.iter().zip(DEFAULT_BYTES).position(|(a, b)| a != b);
     assert_eq!((baked.len(), first), (DEFAULT_BYTES.len(), None));
 }
 
 #[test]
 fn the_number_of_threads_changes_no_bit() {
-    let on = |threads| {
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads start")
-            .install(|| bytes(&small()))
-    };
+    let on = |threads| with_threads(threads, || bytes(&small()));
     let one = on(1);
     assert!(on(3) == one, "three threads gave other bytes than one");
     assert!(on(7) == one, "seven threads gave other bytes than one");

@@ -1,35 +1,24 @@
-//! Doors: closed they are walls that nothing passes, open they are not there.
+//! A closed door lets no light pass, and an open one changes nothing.
 
 use glam::Vec3;
-use mrt_core::storage::Storage;
-use mrt_runtime::FrameConfig;
 use mrt_runtime::blocks::Door;
-use mrt_runtime::{AssembleConfig, Bounces, Coupling, Frame, FrameError, Level, Scene};
-use mrt_tests::FrameForTests;
+use mrt_runtime::{Bounces, Coupling, Frame, FrameConfig, FrameError, Level, Light, Scene};
 use mrt_tests::{
-    CONVERGED, Random, by_texel, corridor, default_dictionary, floor_plan, largest_difference,
-    random_cells, solved, sphere,
+    CONVERGED, COUPLINGS, FrameForTests, Random, by_texel, configured, corridor,
+    default_dictionary, floor_plan, largest_difference, lossless, random_cells, ring, solved,
 };
 
-/// Light behind doors is summed apart from the rest, so sums of products in `f32` come in another order.
-/// Measured: 6e-7 of the brightest texel over ten bounces.
+/// Tolerance relative to the brightest texel: light behind doors is summed apart from the rest, so sums of products in
+/// `f32` have another order. Measured over ten bounces: 6e-7.
 const ROUNDING: f64 = 5e-6;
 
 const TEN: Bounces = Bounces::Count(10);
 
-const COUPLINGS: [Coupling; 2] = [Coupling::Table, Coupling::Lightfield];
-
 fn assembled(level: &Level, coupling: Coupling) -> Scene {
-    let config = AssembleConfig {
-        coupling,
-        transport_storage: Storage::F32,
-        negligible: Some(0.0),
-        ..AssembleConfig::default()
-    };
-    Scene::assemble(level, default_dictionary(), &config).expect("the level fits the dictionary")
+    configured(level, default_dictionary(), &lossless(coupling))
 }
 
-/// The connection between two blocks.
+/// Index of the connection between two blocks.
 fn between(level: &Level, a: usize, b: usize) -> usize {
     level
         .connections
@@ -43,11 +32,11 @@ fn with_door(mut level: Level, connection: usize, value: f32) -> Level {
     level
 }
 
-fn lamp(position: Vec3) -> mrt_runtime::Light {
-    sphere(position, 0.1, Vec3::new(1.0, 2.0, 3.0))
+fn lamp(position: Vec3) -> Light {
+    Light::sphere(position, 0.1, Vec3::new(1.0, 2.0, 3.0))
 }
 
-/// Texels of a signal in some blocks.
+/// A signal at the texels of some blocks.
 fn in_blocks(scene: &Scene, signal: &[f32], blocks: std::ops::Range<usize>) -> Vec<[f32; 3]> {
     let all = by_texel(scene, signal);
     let texels = scene.level.blocks[blocks.start].texels.start
@@ -56,7 +45,7 @@ fn in_blocks(scene: &Scene, signal: &[f32], blocks: std::ops::Range<usize>) -> V
 }
 
 #[test]
-fn what_is_behind_a_closed_door_reads_exactly_zero() {
+fn behind_a_closed_door_light_is_exactly_zero() {
     let level = floor_plan(&corridor(4), 0.9);
     let connection = between(&level, 1, 2);
     let level = with_door(level, connection, 0.0);
@@ -75,14 +64,9 @@ fn what_is_behind_a_closed_door_reads_exactly_zero() {
 }
 
 #[test]
-fn an_open_door_is_none_and_a_closed_one_is_no_connection() {
+fn an_open_door_acts_like_no_door_and_a_closed_one_like_no_connection() {
     let mut random = Random(31);
-    let ring = {
-        let mut cells: Vec<[i32; 2]> = (0..9).map(|k| [k % 3, k / 3]).collect();
-        cells.retain(|&cell| cell != [1, 1]);
-        cells
-    };
-    let mut plans = vec![corridor(5), ring];
+    let mut plans = vec![corridor(5), ring()];
     plans.extend((0..6).map(|_| random_cells(&mut random, 9)));
     for (k, cells) in plans.iter().enumerate() {
         let plain = floor_plan(cells, 0.8);
@@ -112,7 +96,7 @@ fn an_open_door_is_none_and_a_closed_one_is_no_connection() {
 
 #[test]
 fn light_that_crosses_doors_is_multiplied_by_their_values() {
-    // Two doors in a corridor, light of the first block only: block 1 is before them, 2 behind one, 3 behind both.
+    // A corridor with two doors, lit in the first block only. Block 1 is before the doors, 2 behind one, 3 behind both.
     let level = floor_plan(&corridor(4), 0.8);
     let (first, second) = (between(&level, 1, 2), between(&level, 2, 3));
     let level = with_door(with_door(level, first, 1.0), second, 1.0);
@@ -172,7 +156,7 @@ fn opening_a_door_never_takes_light_from_behind_it() {
 }
 
 #[test]
-fn values_that_are_none_and_doors_that_are_not_there_are_refused() {
+fn values_outside_0_to_1_and_doors_that_do_not_exist_are_refused() {
     let level = floor_plan(&corridor(2), 0.5);
     let scene = assembled(&with_door(level, 0, 0.5), Coupling::Table);
     let mut frame = Frame::new(&scene, FrameConfig::default());

@@ -1,16 +1,15 @@
-//! What a game relies on every frame: no allocation, refused lights leave no trace, kinds of lights.
+//! What a game relies on in every frame: no allocation, no trace of a skipped light, and the right light of each kind.
 
 use allocation_counter::measure;
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
-use mrt_runtime::FrameConfig;
 use mrt_runtime::low_level::light::limits::MAX_LIGHTS;
 use mrt_runtime::shadows::Rays;
-use mrt_runtime::{Bounces, Frame, FrameError, Level, Light, LightError, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::normal_of;
-use mrt_tests::position_of;
-use mrt_tests::{assembled, by_texel, floor_plan, solved, sphere};
+use mrt_runtime::{Bounces, Frame, FrameConfig, FrameError, Level, Light, LightError, Scene};
+use mrt_tests::{
+    FrameForTests, assembled, by_texel, corridor, floor_plan, point_and_normal, position_of, shown,
+    solved,
+};
 
 const CELLS: [[i32; 2]; 4] = [[0, 0], [1, 0], [2, 0], [1, 1]];
 
@@ -18,8 +17,8 @@ fn level() -> Level {
     floor_plan(&CELLS, 0.6)
 }
 
-/// Blocks 0 and 1 joined; the opening of block 1 towards block 2 leads outside.
-fn level_with_a_door_outside() -> Level {
+/// Blocks 1 and 2 are not connected, so that the opening of block 1 towards block 2 leads outside.
+fn level_open_to_outside() -> Level {
     let mut level = level();
     level
         .connections
@@ -45,23 +44,18 @@ const GOOD_DIRECTIONAL: Light = Light::Directional {
     irradiance: Vec3::new(5.0, 4.0, 3.0),
 };
 
-/// Everything that a frame shows, bit by bit.
-fn snapshot(frame: &Frame) -> Vec<u32> {
-    let signals = [frame.direct(), frame.indirect(), frame.coefficients()];
-    let lightmap = frame.lightmap().pixels().as_flattened().to_vec();
-    let all = signals.into_iter().chain([lightmap]).flatten();
-    all.map(|x| x.to_bits())
-        .chain([frame.last_report().passes()])
-        .collect()
+/// The bits of all that a frame shows, and the number of its passes.
+fn snapshot(frame: &Frame) -> (Vec<(&'static str, Vec<u32>)>, u32) {
+    (shown(frame), frame.last_report().passes())
 }
 
 #[test]
 fn a_frame_allocates_nothing() {
-    let scene = assembled(&level_with_a_door_outside());
+    let scene = assembled(&level_open_to_outside());
     let mut frame = Frame::new(&scene, FrameConfig::default());
     let lights = [GOOD_SPHERE, GOOD_SPOT, GOOD_DIRECTIONAL];
     let mut outside = lights;
-    outside[2] = sphere(Vec3::new(50.0, 0.5, 0.5), 0.1, Vec3::ONE);
+    outside[2] = Light::sphere(Vec3::new(50.0, 0.5, 0.5), 0.1, Vec3::ONE);
     let converged = Bounces::Converged {
         tolerance: 1e-3,
         limit: 50,
@@ -72,7 +66,7 @@ fn a_frame_allocates_nothing() {
         Bounces::Feedback,
         converged,
     ] {
-        // The very first frame included.
+        // The first frame counts too.
         let counted = measure(|| {
             for lights in [&lights[..], &lights[..1], &[], &lights[..]] {
                 frame.light_with(lights, bounces);
@@ -84,13 +78,13 @@ fn a_frame_allocates_nothing() {
         });
         assert_eq!(counted.count_total, 0, "{bounces:?}");
     }
-    // The counter works here.
+    // The counter does count.
     assert!(measure(|| drop(std::hint::black_box(vec![1u8; 100]))).count_total > 0);
 }
 
 #[test]
-fn the_most_lights_fit_without_allocation_and_one_more_is_skipped() {
-    let scene = assembled(&floor_plan(&[[0, 0]], 0.5));
+fn the_largest_number_of_lights_needs_no_allocation_and_one_more_is_skipped() {
+    let scene = assembled(&floor_plan(&corridor(1), 0.5));
     let mut frame = Frame::new(&scene, FrameConfig::default());
     let lights = vec![GOOD_SPHERE; MAX_LIGHTS + 1];
     let counted = measure(|| {
@@ -113,7 +107,7 @@ fn the_most_lights_fit_without_allocation_and_one_more_is_skipped() {
 const NOT_NUMBERS: [f32; 4] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 2e9];
 const NEGATIVE: [f32; 2] = [-1.0, -1e-30];
 
-/// A light with one of its values replaced, for all values and all that they must not be.
+/// Lights with one faulty value each, for every value and every fault, and the name of that value.
 fn faulty_lights() -> Vec<(&'static str, Light)> {
     let mut faulty = Vec::new();
     let all = || NOT_NUMBERS.into_iter().chain(NEGATIVE);
@@ -125,7 +119,7 @@ fn faulty_lights() -> Vec<(&'static str, Light)> {
         for bad in all() {
             faulty.push((
                 "intensity",
-                sphere(Vec3::splat(0.5), 0.1, with(Vec3::ONE, bad)),
+                Light::sphere(Vec3::splat(0.5), 0.1, with(Vec3::ONE, bad)),
             ));
             faulty.push((
                 "irradiance",
@@ -138,7 +132,7 @@ fn faulty_lights() -> Vec<(&'static str, Light)> {
         for bad in NOT_NUMBERS {
             faulty.push((
                 "position",
-                sphere(with(Vec3::splat(0.5), bad), 0.1, Vec3::ONE),
+                Light::sphere(with(Vec3::splat(0.5), bad), 0.1, Vec3::ONE),
             ));
             faulty.push((
                 "direction",
@@ -151,12 +145,12 @@ fn faulty_lights() -> Vec<(&'static str, Light)> {
         }
     }
     for bad in all() {
-        faulty.push(("radius", sphere(Vec3::splat(0.5), bad, Vec3::ONE)));
+        faulty.push(("radius", Light::sphere(Vec3::splat(0.5), bad, Vec3::ONE)));
         faulty.push(("inner angle", spot(Vec3::NEG_Y, bad, 1.0)));
         faulty.push(("outer angle", spot(Vec3::NEG_Y, 0.0, bad)));
     }
     faulty.push(("outer angle", spot(Vec3::NEG_Y, 0.0, 3.2)));
-    // Inner beyond outer.
+    // The inner angle is larger than the outer.
     faulty.push(("inner angle", spot(Vec3::NEG_Y, 1.0, 0.9)));
     faulty
 }
@@ -210,14 +204,14 @@ fn faulty_lights_are_named_and_the_others_shine() {
         Vec3::splat(1e9),
         Vec3::new(0.5, 1.001, 0.5),
     ] {
-        let error = refuse(sphere(position, 0.1, Vec3::ONE));
+        let error = refuse(Light::sphere(position, 0.1, Vec3::ONE));
         assert!(matches!(error, LightError::OutsideBlocks { .. }), "{error}");
     }
 }
 
 #[test]
 fn extreme_but_legal_lights_give_finite_light() {
-    let scene = assembled(&level_with_a_door_outside());
+    let scene = assembled(&level_open_to_outside());
     let mut lights = Vec::new();
     for intensity in [0.0, f32::MIN_POSITIVE, 1e9] {
         for radius in [0.0, f32::MIN_POSITIVE, 1e9] {
@@ -227,7 +221,7 @@ fn extreme_but_legal_lights_give_finite_light() {
                 position_of(&scene, 17),
                 Vec3::new(1.0, 0.5, 0.5),
             ] {
-                lights.push(sphere(position, radius, Vec3::splat(intensity)));
+                lights.push(Light::sphere(position, radius, Vec3::splat(intensity)));
             }
         }
     }
@@ -287,7 +281,7 @@ fn a_spot_is_a_sphere_inside_its_cone_and_dark_outside() {
     let spot = solved(&scene, &[GOOD_SPOT], Bounces::Count(1));
     let sphere = solved(
         &scene,
-        &[sphere(position, radius, intensity)],
+        &[Light::sphere(position, radius, intensity)],
         Bounces::Count(1),
     );
     let (spot, sphere) = (
@@ -324,39 +318,39 @@ fn directional_light_enters_through_outside_openings_only() {
             .all(|&e| e == 0.0)
     );
 
-    let open = assembled(&level_with_a_door_outside());
+    let open = assembled(&level_open_to_outside());
     let frame = solved(&open, &[GOOD_DIRECTIONAL], Bounces::Count(1));
     let direct = by_texel(&open, &frame.direct());
     let flux = direct.iter().map(|e| f64::from(e[0])).sum::<f64>() / 256.0;
     let direction = DVec3::new(-1.0, -0.3, 0.2).normalize();
-    // What passes the unit opening in the plane x = 2, all of which ends on walls of blocks 0, 1 and 3.
+    // The flux through the unit opening in the plane x = 2. All of it ends on walls of blocks 0, 1 and 3.
     let expected = 5.0 * -direction.x;
-    // The light's edges cut through texels of 1/16: about half a texel along each of them.
+    // The edges of the light cut through texels of 1/16, and err by about half a texel.
     assert!((flux / expected - 1.0).abs() < 0.05, "{flux} of {expected}");
-    // Block 2 opens to the other side: light that travels to -x does not enter through its face -x.
+    // Block 2 opens in the other direction: light that travels along -x does not enter through its face -x.
     for texel in open.level.blocks[2].texels.clone() {
         assert_eq!(direct[texel], [0.0; 3]);
     }
     check_against_rays(&open, direction, &direct);
 }
 
-/// Traces each texel back through the only door, at x = 2.
+/// Compares with rays from each texel back through the only opening to the outside, at x = 2.
 fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
-    // Texels whose ray passes the door's rim this closely are left to rounding.
+    // Rounding decides about texels whose ray passes the rim of the opening as closely as this.
     const RIM: f64 = 1e-6;
     for block in [0, 1] {
         for texel in scene.level.blocks[block].texels.clone() {
-            let position = position_of(&scene, texel).as_dvec3();
-            let normal = normal_of(&scene, texel).as_dvec3();
+            let (position, normal) = point_and_normal(scene, texel);
             let distance = (2.0 - position.x) / -direction.x;
-            let door = position - direction * distance;
-            let depth = door.y.min(1.0 - door.y).min(door.z.min(1.0 - door.z));
+            let crossing = position - direction * distance;
+            let [y, z] = [crossing.y, crossing.z].map(|u| u.min(1.0 - u));
+            let depth = y.min(z);
             if depth.abs() < RIM {
                 continue;
             }
             let cosine = -normal.dot(direction);
             let lit = depth > 0.0 && cosine > 0.0;
-            // Block 0 sees the door through block 1, whose sides are open or in one plane with the door's.
+            // Block 0 sees the opening through block 1, whose sides are open or in one plane with the opening's sides.
             let expected = if lit { 5.0 * cosine } else { 0.0 };
             let found = f64::from(direct[texel][0]);
             assert!(
@@ -369,9 +363,8 @@ fn check_against_rays(scene: &Scene, direction: DVec3, direct: &[[f32; 3]]) {
 }
 
 #[test]
-fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
-    let level = Level::from_cells(&[[0, 0, 0]], Vec3::splat(0.5)).expect("one cell");
-    let scene = assembled(&level);
+fn a_spot_on_a_texel_and_rays_out_of_range_spread_no_nan() {
+    let scene = assembled(&floor_plan(&corridor(1), 0.5));
     let mut frame = Frame::new(&scene, FrameConfig::default());
     let on_texel = Light::Spot {
         position: position_of(&scene, 0),
@@ -385,13 +378,9 @@ fn a_spot_on_a_texel_and_a_careless_ray_function_spread_no_nan() {
     assert!(frame.direct().iter().all(|e| e.is_finite()));
     assert!(frame.indirect().iter().sum::<f32>() > 0.0);
 
-    let lamp = Light::Sphere {
-        position: Vec3::splat(0.5),
-        radius: 0.1,
-        intensity: Vec3::ONE,
-    };
-    let careless = Rays(|from: DVec3, _| if from.x > 0.5 { f32::NAN } else { 7.0 });
-    frame.light_through(&[lamp], &careless, Bounces::Count(1));
+    let lamp = Light::sphere(Vec3::splat(0.5), 0.1, Vec3::ONE);
+    let out_of_range = Rays(|from: DVec3, _| if from.x > 0.5 { f32::NAN } else { 7.0 });
+    frame.light_through(&[lamp], &out_of_range, Bounces::Count(1));
     assert!(frame.direct().iter().all(|e| e.is_finite()));
     assert!(frame.indirect().iter().sum::<f32>() > 0.0);
 

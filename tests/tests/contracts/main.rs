@@ -1,8 +1,10 @@
-//! What callers may rely on: outputs, doors, files, bits.
+//! What callers may rely on: the facade, outputs, doors, files, documents, and bits that never change.
 
 mod bake_reproducible;
 mod direct_light;
+mod documents;
 mod doors;
+mod facade;
 mod frame;
 mod lightmap;
 mod old_versions;

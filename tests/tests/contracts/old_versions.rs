@@ -1,35 +1,43 @@
-//! Every version of the dictionary format stays readable: `assets/versions` has a file of each.
+//! Every version of the dictionary format stays readable. The folder `assets/versions` has a file of each.
 
 use glam::{Vec3, vec3};
 use mrt_core::container::ByteBudget;
-use mrt_core::storage::Storage;
-use mrt_runtime::BlockIndex;
-use mrt_runtime::FrameConfig;
 use mrt_runtime::low_level::modular::dictionary::StoredDictionary;
 use mrt_runtime::low_level::modular::dictionary_file::DICTIONARY_VERSION;
-use mrt_runtime::{AssembleConfig, Bounces, Coupling, Dictionary, Frame, Level, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::{CONVERGED, floor_plan, largest_difference, solved, sphere};
+use mrt_runtime::{
+    AssembleConfig, BlockIndex, Bounces, Coupling, Dictionary, Frame, FrameConfig, Level, Light,
+};
+use mrt_tests::{
+    CONVERGED, FrameForTests, MOBILE_BYTES, OLDEST_BYTES, configured, corridor, floor_plan,
+    largest_difference, lossless, scene_of, solved,
+};
 
 const BYTE_BUDGET: u64 = 16 << 20;
 
-/// The old program and this one add up in another order; these are a few roundings of `f32`.
+/// A few roundings of `f32`: the old program and this one sum in different orders.
 const OLD_FIGURES_TOLERANCE: f64 = 2e-6;
 
-/// What scaling a channel takes of a bounce, at most.
+/// Largest share of a bounce that a frame takes away when it scales a channel down.
 const MOST_LIMITED: f64 = 3e-3;
 
-fn file(version: u32) -> Vec<u8> {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/versions");
-    std::fs::read(format!("{folder}/{version}.mrt")).expect("a file of each version is committed")
+fn file(version: u32) -> &'static [u8] {
+    match version {
+        1 => OLDEST_BYTES,
+        DICTIONARY_VERSION => MOBILE_BYTES,
+        other => panic!("version {other} has no file"),
+    }
 }
 
 fn read(version: u32) -> Dictionary {
-    Dictionary::from_bytes_within(&file(version), &mut ByteBudget::new(BYTE_BUDGET))
-        .expect("readable")
+    let mut budget = ByteBudget::new(BYTE_BUDGET);
+    Dictionary::from_bytes_within(file(version), &mut budget).expect("readable")
 }
 
-/// A corridor with branches and a room of four: every shape but the closed one.
+fn read_stored(bytes: &[u8]) -> StoredDictionary<'_> {
+    StoredDictionary::read(bytes, &mut ByteBudget::new(BYTE_BUDGET)).expect("readable")
+}
+
+/// A corridor with branches and a room of four cells. It has every shape but the closed one.
 fn level() -> Level {
     let cells = [
         [0, 0],
@@ -49,8 +57,8 @@ fn level() -> Level {
     Level::from_cells(&cells, Vec3::new(0.7, 0.5, 0.3)).expect("cells side by side are a level")
 }
 
-/// What the program of version 1 (commit 3a2e541) gave with that file, that level and the lights below: indirect
-/// irradiance of texel 37 of each block after one bounce, and after three.
+/// Indirect irradiance of texel 37 of each block after one bounce, and after three: computed by the program of version 1
+/// (commit 3a2e541) with the file of that version, the level above and the lights below.
 const VERSION_1_FIGURES: [[[f32; 3]; 12]; 2] = [
     [
         [2.5811183, 1.38853, 0.56111044],
@@ -85,16 +93,11 @@ const VERSION_1_FIGURES: [[[f32; 3]; 12]; 2] = [
 #[test]
 fn version_1_lights_a_level_as_its_program_did() {
     let lights = [
-        sphere(vec3(0.4, 0.7, 0.5), 0.15, vec3(2.0, 1.5, 1.0)),
-        sphere(vec3(3.6, 0.6, 2.4), 0.15, vec3(0.5, 0.7, 1.0)),
+        Light::sphere(vec3(0.4, 0.7, 0.5), 0.15, vec3(2.0, 1.5, 1.0)),
+        Light::sphere(vec3(3.6, 0.6, 2.4), 0.15, vec3(0.5, 0.7, 1.0)),
     ];
-    // Figures of a program that kept operators in `f32`.
-    let config = AssembleConfig {
-        transport_storage: Storage::F32,
-        negligible: Some(0.0),
-        ..AssembleConfig::default()
-    };
-    let scene = Scene::assemble(&level(), &read(1), &config).expect("it fits");
+    // The old program kept operators in `f32`.
+    let scene = configured(&level(), &read(1), &lossless(Coupling::Table));
     let mut frame = Frame::new(&scene, FrameConfig::default());
     for (bounces, expected) in [1, 3].into_iter().zip(&VERSION_1_FIGURES) {
         frame.light_with(&lights, Bounces::Count(bounces));
@@ -102,8 +105,8 @@ fn version_1_lights_a_level_as_its_program_did() {
             .map(|block| frame.indirect_at(BlockIndex::new(block), 37))
             .map(|light| light.expect("a texel").to_array())
             .collect();
-        // Frames have since learnt to scale a channel in which truncation makes light out of nothing, as it does in
-        // a closed level.
+        // Unlike the old program, frames scale a channel down when truncated operators make light out of nothing, which
+        // happens in a closed level.
         let mut scaled = *expected;
         for channel in 0..3 {
             let sum = |texels: &[[f32; 3]]| -> f64 {
@@ -117,7 +120,7 @@ fn version_1_lights_a_level_as_its_program_did() {
             }
         }
         let error = largest_difference(&found, &scaled);
-        // Of several bounces each was scaled, by its own share.
+        // Each of several bounces is scaled by a share of its own.
         let tolerance = match bounces {
             1 => OLD_FIGURES_TOLERANCE,
             _ => MOST_LIMITED,
@@ -127,7 +130,7 @@ fn version_1_lights_a_level_as_its_program_did() {
 }
 
 #[test]
-fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
+fn version_1_has_no_table_and_always_uses_lightfields() {
     let dictionary = read(1);
     assert!(dictionary.paths.entries.is_empty());
     let joined = |coupling| {
@@ -135,8 +138,8 @@ fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
             coupling,
             ..AssembleConfig::default()
         };
-        let scene = Scene::assemble(&level(), &dictionary, &config).expect("it fits");
-        let light = sphere(vec3(0.4, 0.7, 0.5), 0.15, Vec3::ONE);
+        let scene = configured(&level(), &dictionary, &config);
+        let light = Light::sphere(vec3(0.4, 0.7, 0.5), 0.15, Vec3::ONE);
         solved(&scene, &[light], CONVERGED).indirect()
     };
     assert_eq!(joined(Coupling::Table), joined(Coupling::Lightfield));
@@ -145,36 +148,28 @@ fn version_1_without_a_table_follows_lightfields_when_asked_for_either() {
 #[test]
 fn every_version_lights_a_room() {
     for version in 1..=DICTIONARY_VERSION {
-        let level = floor_plan(&[[0, 0], [1, 0], [2, 0]], 0.5);
-        let scene =
-            Scene::assemble(&level, &read(version), &AssembleConfig::default()).expect("it fits");
-        let light = sphere(vec3(0.5, 0.5, 0.5), 0.15, Vec3::ONE);
+        let scene = scene_of(&floor_plan(&corridor(3), 0.5), &read(version));
+        let light = Light::sphere(vec3(0.5, 0.5, 0.5), 0.15, Vec3::ONE);
         let frame = solved(&scene, &[light], Bounces::Count(2));
         for block in 0..3 {
-            let lit = frame
-                .indirect_at(BlockIndex::new(block), 7)
-                .expect("a texel")
-                .x;
+            let lit = frame.indirect_at(BlockIndex::new(block), 7);
+            let lit = lit.expect("a texel").x;
             assert!(lit > 1e-3, "version {version}, block {block}: {lit}");
         }
     }
 }
 
-/// Old files are written again in the newest version.
 #[test]
-fn version_1_becomes_the_newest() {
-    let bytes = file(1);
-    let old = StoredDictionary::read(&bytes, &mut ByteBudget::new(BYTE_BUDGET)).expect("readable");
+fn version_1_can_be_written_as_the_newest_version() {
+    let old = read_stored(file(1));
     let new = old.to_bytes().expect("it fits");
-    let again = StoredDictionary::read(&new, &mut ByteBudget::new(BYTE_BUDGET)).expect("readable");
-    assert!(again.decode() == old.decode());
+    assert!(read_stored(&new).decode() == old.decode());
 }
 
 #[test]
 fn the_newest_version_has_not_changed_unnoticed() {
     let bytes = file(DICTIONARY_VERSION);
-    let dictionary = StoredDictionary::read(&bytes, &mut ByteBudget::new(BYTE_BUDGET));
-    let written = dictionary.expect("readable").to_bytes().expect("it fits");
+    let written = read_stored(bytes).to_bytes().expect("it fits");
     assert!(
         written == bytes,
         "the format is another than that of assets/versions/{DICTIONARY_VERSION}.mrt; if that version has been \

@@ -1,44 +1,37 @@
-//! Dictionaries in fewer bytes: how exact the light is, where the bytes lie, and what packing leaves.
+//! Dictionaries in fewer bytes: errors of the light, reading in place, and packing for a level.
 
 use glam::{DVec3, Vec3, dvec3, vec3};
 use mrt_core::container::ByteBudget;
 use mrt_core::storage::Storage;
-use mrt_runtime::FrameConfig;
 use mrt_runtime::blocks::WarpTransport;
 use mrt_runtime::low_level::modular::dictionary::{OperatorMatrix, StoredDictionary, Variant};
 use mrt_runtime::low_level::modular::pack::{PackConfig, pack};
 use mrt_runtime::{
-    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, Level, Light, Scene,
+    AssembleConfig, AssembleError, Bounces, Coupling, Dictionary, Frame, FrameConfig, Level, Light,
+    Scene,
 };
-use mrt_tests::FrameForTests;
-use mrt_tests::{DEFAULT_BYTES, corridor, floor_plan, sphere};
+use mrt_tests::{
+    COUPLINGS, FrameForTests, corridor, default_dictionary, floor_plan, lossless,
+    mobile_dictionary, refusal, relative_l2, square,
+};
 
 const BYTE_BUDGET: u64 = 64 << 20;
 
-/// Relative L2 of indirect irradiance over a level, against that of `f32`.
+/// Relative L2 error of indirect irradiance over a level, against a dictionary in `f32`.
 const F16_TOLERANCE: f64 = 3e-4;
 
-/// With the paper's coupling, which is not the default, a corridor of the mobile preset errs by 0.033 %: light there
-/// is a sum of more products with coefficients of both signs.
+/// [`F16_TOLERANCE`] with lightfields: a corridor of the mobile preset errs by 0.033 %, since light there is a sum of more
+/// products, with coefficients of both signs.
 const F16_LIGHTFIELD_TOLERANCE: f64 = 3.5e-4;
+
+/// As [`F16_TOLERANCE`].
+const INT8_TOLERANCE: f64 = 5e-3;
 
 fn f16_tolerance(coupling: Coupling) -> f64 {
     match coupling {
         Coupling::Table => F16_TOLERANCE,
         Coupling::Lightfield => F16_LIGHTFIELD_TOLERANCE,
     }
-}
-const INT8_TOLERANCE: f64 = 5e-3;
-
-/// The mobile preset at 6² texels in the newest format.
-fn mobile() -> Dictionary {
-    let bytes = include_bytes!("../../../assets/versions/2.mrt");
-    Dictionary::from_bytes_within(bytes, &mut ByteBudget::new(BYTE_BUDGET))
-        .expect("the file is sound")
-}
-
-fn standard() -> Dictionary {
-    Dictionary::from_bytes_within(DEFAULT_BYTES, &mut ByteBudget::new(BYTE_BUDGET)).expect("sound")
 }
 
 fn maze() -> Level {
@@ -47,20 +40,19 @@ fn maze() -> Level {
 }
 
 fn levels() -> Vec<(&'static str, Level)> {
-    let room: Vec<[i32; 2]> = (0..9).map(|k| [k % 3, k / 3]).collect();
     vec![
         ("maze", maze()),
         ("corridor", floor_plan(&corridor(5), 0.5)),
-        ("cube", floor_plan(&[[0, 0]], 0.5)),
-        ("room", floor_plan(&room, 0.5)),
+        ("cube", floor_plan(&corridor(1), 0.5)),
+        ("room", floor_plan(&square(3), 0.5)),
     ]
 }
 
-/// One in the middle of the first block, others off centre, and two at once.
+/// A light in the middle of the first block, two others off the middle, and two lights at once.
 fn light_sets(level: &Level) -> Vec<Vec<Light>> {
     let at = |block: usize, unit: DVec3, intensity: Vec3| {
         let position = level.blocks[block].canonical_warp().point(unit);
-        sphere(position.as_vec3(), 0.15, intensity)
+        Light::sphere(position.as_vec3(), 0.15, intensity)
     };
     let last = level.blocks.len() - 1;
     let warm = at(0, dvec3(0.6, 0.7, 0.4), vec3(1.0, 0.8, 0.6));
@@ -75,7 +67,7 @@ fn light_sets(level: &Level) -> Vec<Vec<Light>> {
     ]
 }
 
-/// Indirect irradiance of all texels, light set after light set, after one bounce and after four.
+/// Indirect irradiance of all texels after one bounce and after four, for one set of lights after another.
 fn lit<M: OperatorMatrix>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -85,6 +77,7 @@ fn lit<M: OperatorMatrix>(
     lit_to(level, dictionary, coupling, depth)
 }
 
+/// [`lit`], with light that ends after `max_depth` openings.
 fn lit_to<M: OperatorMatrix>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -92,11 +85,8 @@ fn lit_to<M: OperatorMatrix>(
     max_depth: usize,
 ) -> Vec<Vec<f32>> {
     let config = AssembleConfig {
-        coupling,
         max_depth,
-        transport_storage: Storage::F32,
-        negligible: Some(0.0),
-        ..AssembleConfig::default()
+        ..lossless(coupling)
     };
     let scene = Scene::assemble(level, dictionary, &config).expect("the level fits the dictionary");
     let mut frame = Frame::new(&scene, FrameConfig::default());
@@ -110,22 +100,12 @@ fn lit_to<M: OperatorMatrix>(
     signals
 }
 
-fn relative_l2(found: &[f32], expected: &[f32]) -> f64 {
-    let square = |x: f64| x * x;
-    let pairs = found.iter().zip(expected);
-    let error: f64 = pairs
-        .map(|(&a, &b)| square(f64::from(a) - f64::from(b)))
-        .sum();
-    let size: f64 = expected.iter().map(|&x| square(f64::from(x))).sum();
-    (error / size).sqrt()
-}
-
 #[test]
-fn light_errs_as_stated() {
-    for dictionary in [mobile(), standard()] {
-        for coupling in [Coupling::Table, Coupling::Lightfield] {
+fn storage_changes_light_by_less_than_stated() {
+    for dictionary in [mobile_dictionary(), default_dictionary()] {
+        for coupling in COUPLINGS {
             for (name, level) in levels() {
-                let exact = lit(&level, &dictionary, coupling);
+                let exact = lit(&level, dictionary, coupling);
                 for (storage, tolerance) in [
                     (Storage::F32, 0.0),
                     (Storage::F16, f16_tolerance(coupling)),
@@ -144,8 +124,8 @@ fn light_errs_as_stated() {
 }
 
 #[test]
-fn fewer_bytes_are_fewer() {
-    let dictionary = mobile();
+fn smaller_storage_makes_smaller_files() {
+    let dictionary = mobile_dictionary();
     let bytes = |storage| {
         dictionary
             .stored_as(storage)
@@ -154,12 +134,13 @@ fn fewer_bytes_are_fewer() {
             .len() as f64
     };
     let whole = bytes(Storage::F32);
-    // The small kinds that `f16` leaves at `f32` are a quarter of this preset.
+    // In this preset, a quarter of the bytes are small matrices that `f16` storage leaves in `f32`.
     assert!(bytes(Storage::F16) < 0.7 * whole);
     assert!(bytes(Storage::Int8) < 0.4 * whole);
 }
 
-/// Room for a file at a multiple of 64 bytes, as mapped files are, and one byte beyond.
+/// The file in memory at a multiple of 64 bytes, where mapped files are, or `shift` bytes behind that. The range is the
+/// file's place.
 fn placed(file: &[u8], shift: usize) -> (Vec<u8>, std::ops::Range<usize>) {
     let mut room = vec![0; file.len() + 128];
     let start = room.as_ptr().align_offset(64) + shift;
@@ -167,9 +148,9 @@ fn placed(file: &[u8], shift: usize) -> (Vec<u8>, std::ops::Range<usize>) {
     (room, start..start + file.len())
 }
 
-/// A dictionary with a variant, so that every section is there.
-fn with_variant() -> Dictionary {
-    let mut dictionary = mobile();
+/// A dictionary with variants, whose file has every kind of section.
+fn with_variants() -> Dictionary {
+    let mut dictionary = mobile_dictionary().clone();
     let mut corners = [[0.0; 3]; 8];
     for (k, corner) in corners.iter_mut().enumerate() {
         *corner = [0, 1, 2].map(|axis| (k >> axis & 1) as f32 * 0.5);
@@ -185,8 +166,8 @@ fn with_variant() -> Dictionary {
 }
 
 #[test]
-fn files_give_back_what_was_stored_in_place_or_not() {
-    let dictionary = with_variant();
+fn files_give_back_what_was_stored_aligned_or_not() {
+    let dictionary = with_variants();
     for storage in Storage::ALL {
         let stored = dictionary.stored_as(storage);
         let file = stored.to_bytes().expect("it fits");
@@ -199,7 +180,7 @@ fn files_give_back_what_was_stored_in_place_or_not() {
             let spent = BYTE_BUDGET - budget.remaining();
             if shift == 0 && cfg!(target_endian = "little") {
                 read.map(|kind, matrix| assert!(matrix.is_borrowed(), "{kind:?}"));
-                // Sections' names, singular values, corners.
+                // Names of sections, singular values and corners are copied all the same.
                 assert!(spent < 64 << 10, "{spent} bytes");
             } else if storage != Storage::Int8 {
                 assert!(spent as usize > read.bytes() / 2, "{spent} bytes");
@@ -210,11 +191,11 @@ fn files_give_back_what_was_stored_in_place_or_not() {
 
 #[test]
 fn stored_and_decoded_dictionaries_give_the_same_light() {
-    let dictionary = mobile();
+    let dictionary = mobile_dictionary();
     let level = maze();
     for storage in Storage::ALL {
         let stored = dictionary.stored_as(storage);
-        for coupling in [Coupling::Table, Coupling::Lightfield] {
+        for coupling in COUPLINGS {
             let decoded = lit(&level, &stored.decode(), coupling);
             assert!(lit(&level, &stored, coupling) == decoded);
         }
@@ -223,7 +204,7 @@ fn stored_and_decoded_dictionaries_give_the_same_light() {
 
 #[test]
 fn packed_dictionaries_give_the_same_light_in_fewer_bytes() {
-    let dictionary = with_variant();
+    let dictionary = with_variants();
     for (name, level) in levels() {
         for storage in Storage::ALL {
             let whole = dictionary.stored_as(storage);
@@ -251,7 +232,7 @@ fn packed_dictionaries_give_the_same_light_in_fewer_bytes() {
                     "{name} {config:?}"
                 );
                 let found = lit(&level, &read, Coupling::Table);
-                // Without lightfields light ends with the table's longest path.
+                // Without lightfields, light ends at the table's longest path.
                 let depth = if config.lightfields {
                     AssembleConfig::default().max_depth
                 } else {
@@ -272,13 +253,13 @@ fn packed_dictionaries_give_the_same_light_in_fewer_bytes() {
 
 #[test]
 fn a_packed_dictionary_says_what_another_level_lacks() {
-    let dictionary = mobile();
+    let dictionary = mobile_dictionary();
     let config = PackConfig {
         lightfields: false,
         ..PackConfig::default()
     };
-    let refusal = |from: &Level, to: &Level, coupling| {
-        let packed = pack(from, &dictionary, &config).expect("it fits");
+    let packed_refusal = |from: &Level, to: &Level, coupling| {
+        let packed = pack(from, dictionary, &config).expect("it fits");
         let config = AssembleConfig {
             coupling,
             ..AssembleConfig::default()
@@ -287,23 +268,20 @@ fn a_packed_dictionary_says_what_another_level_lacks() {
     };
     let short = floor_plan(&corridor(2), 0.5);
     let long = floor_plan(&corridor(4), 0.5);
-    let error = refusal(&short, &long, Coupling::Table);
+    let error = packed_refusal(&short, &long, Coupling::Table);
     assert!(
         matches!(error, AssembleError::MissingShape { block: 1, .. }),
         "{error}"
     );
-    // All shapes, but of paths only those of a corridor.
+    // A dictionary with all shapes, and no paths but those of a corridor.
     let zigzag = floor_plan(&[[0, 0], [1, 0], [1, 1], [2, 1], [2, 2]], 0.5);
     let straight = floor_plan(&corridor(3), 0.5);
     let mut both = dictionary.clone();
-    both.paths = pack(&straight, &dictionary, &config)
-        .expect("it fits")
-        .paths;
-    let error = Scene::assemble(&zigzag, &both, &AssembleConfig::default()).expect_err("no corner");
-    match &error {
-        AssembleError::MissingPath { word, .. } => assert_eq!(word, "zx", "{error}"),
+    both.paths = pack(&straight, dictionary, &config).expect("it fits").paths;
+    match &refusal(&zigzag, &both) {
+        AssembleError::MissingPath { word, .. } => assert_eq!(word, "zx"),
         other => panic!("{other}"),
     }
-    let error = refusal(&short, &short, Coupling::Lightfield);
+    let error = packed_refusal(&short, &short, Coupling::Lightfield);
     assert_eq!(error, AssembleError::MissingLightfields);
 }

@@ -1,34 +1,33 @@
-//! Levels from anywhere, as text and in memory: every fault has a name, and nothing panics.
+//! Levels from arbitrary text and in memory: every fault is a named error, and nothing panics.
 
 use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::HexahedronError;
 use mrt_runtime::blocks::{Connection, Opening};
 use mrt_runtime::{AssembleConfig, AssembleError, Level, LevelError, LevelTextError, Scene};
-use mrt_tests::{default_dictionary, floor_plan};
+use mrt_tests::{corridor, default_dictionary, floor_plan, refusal};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
 /// Two dead ends that face each other.
 fn pair() -> Level {
-    floor_plan(&[[0, 0], [1, 0]], 0.5)
+    floor_plan(&corridor(2), 0.5)
 }
 
-/// The first fault of [`pair`] after a change.
+/// The first fault that the check finds in [`pair`] after a change.
 fn fault(change: impl FnOnce(&mut Level)) -> LevelError {
     let mut level = pair();
     change(&mut level);
     let error = level.check().expect_err("the level is faulty");
-    // Assembly finds the same, and text that was written says so when it is read.
-    let assembled = Scene::assemble(&level, default_dictionary(), &AssembleConfig::default());
-    // NaN is not equal to itself.
+    // Assembly finds the same fault. Faults are compared as text, since NaN is not equal to itself.
     let same = |other: &LevelError| other.to_string() == error.to_string();
-    assert!(matches!(assembled, Err(AssembleError::Level(other)) if same(&other)));
+    let refusal = refusal(&level, default_dictionary());
+    assert!(matches!(refusal, AssembleError::Level(other) if same(&other)));
     error
 }
 
 #[test]
-fn geometry_that_makes_no_sense_has_a_name() {
+fn faulty_geometry_is_named() {
     let overlap = fault(|level| {
         level.connections.clear();
         let corners = &mut level.blocks[1].warp.corners;
@@ -86,7 +85,7 @@ fn geometry_that_makes_no_sense_has_a_name() {
 }
 
 #[test]
-fn connections_that_make_no_sense_have_a_name() {
+fn faulty_connections_are_named() {
     let connect = |a: (usize, Face), b: (usize, Face)| Connection {
         a: Opening {
             block: a.0,
@@ -146,14 +145,12 @@ fn connections_that_make_no_sense_have_a_name() {
 
 #[test]
 fn interfaces_rolled_by_a_quarter_turn_are_refused() {
-    // About the corridor's axis: the openings stay where they are, up does not.
+    // A turn about the corridor's axis keeps the openings in place, but not the upward direction.
     for (x, y) in [(Face::NegX, Face::PosZ), (Face::NegX, Face::NegZ)] {
         let mut level = pair();
         level.blocks[1].orientation = CubeRotation::from_images(x, y).expect("perpendicular");
         assert_eq!(level.check(), Ok(()));
-        let error = Scene::assemble(&level, default_dictionary(), &AssembleConfig::default())
-            .map(|_| ())
-            .expect_err("rolled");
+        let error = refusal(&level, default_dictionary());
         let named = matches!(
             error,
             AssembleError::RolledInterface {
@@ -166,7 +163,7 @@ fn interfaces_rolled_by_a_quarter_turn_are_refused() {
     }
 }
 
-/// What mutations of level text put in.
+/// Pieces of text that a mutation may insert.
 const TOKENS: [&str; 24] = [
     "",
     "-1",
@@ -194,6 +191,7 @@ const TOKENS: [&str; 24] = [
     "#",
 ];
 
+/// A change to a list of tokens.
 #[derive(Clone, Debug)]
 enum Mutation {
     Delete(prop::sample::Index),
@@ -214,7 +212,7 @@ fn mutation() -> impl Strategy<Value = Mutation> {
     ]
 }
 
-/// Words, blanks and single signs; together they are the text.
+/// The text as words, blanks and single signs.
 fn tokens(text: &str) -> Vec<String> {
     let kind = |c: char| match c {
         c if c.is_alphanumeric() || "+-._".contains(c) => 0,
@@ -268,7 +266,7 @@ proptest! {
                 Mutation::Cut(i) => tokens.truncate(i.index(n)),
             }
         }
-        // What is still a level must pass all that follows.
+        // A text that is still a level must pass all later steps.
         if let Ok(level) = Level::from_text(&tokens.concat()) {
             prop_assert_eq!(level.check(), Ok(()));
             let text = level.to_text().expect("a sound level has text");
@@ -288,7 +286,7 @@ proptest! {
 }
 
 #[test]
-fn text_that_is_no_level_says_why() {
+fn text_that_is_no_level_is_refused_by_a_named_error() {
     let sound = sound_text();
     let error = |text: &str| Level::from_text(text).expect_err("not a level");
     assert!(matches!(error(""), LevelTextError::NotALevel { .. }));

@@ -1,6 +1,6 @@
-//! Damaged, absurd and hostile input.
+//! Damaged, absurd and hostile input is refused by a named error.
 
-mod dictionaries;
-mod files;
+mod dictionary_bytes;
+mod dictionary_sections;
 mod levels;
-mod references;
+mod reference_files;

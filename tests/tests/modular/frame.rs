@@ -1,6 +1,6 @@
-//! Frames: instruction sets, parts, skipping, long runs.
+//! Frames: kernels, parts, skipped work, large levels and long runs.
 
-mod levels;
+mod kernels;
 mod parts;
 mod skipping;
 mod stress;

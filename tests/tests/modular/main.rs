@@ -1,4 +1,4 @@
-//! Modular transport part by part: paths, holes, storeys, tubes, warps, probes, and frames that skip work.
+//! Modular transport part by part: paths, holes, vertical openings, tubes, warps, probes, and frames.
 
 mod frame;
 mod great_hall;

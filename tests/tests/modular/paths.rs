@@ -1,75 +1,62 @@
-//! Transport along paths of openings, against form factors and against itself run backwards.
+//! Transport along paths of openings, against exact form factors and against the reversed paths.
 
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
-use mrt_core::linalg::matrix::Matrix;
 use mrt_core::reference::radiosity::transport::Transport;
-use mrt_dictionary::config::BakeConfig;
-use mrt_dictionary::modular::bake::bake;
-use mrt_dictionary::modular::paths::transport::{
-    EMITTER, Gather, RECEIVER, Signals, gather, texel_at,
-};
-use mrt_dictionary::progress::Progress;
-use mrt_runtime::BlockIndex;
-use mrt_runtime::FrameConfig;
+use mrt_dictionary::modular::paths::ends::{EMITTER, RECEIVER};
+use mrt_dictionary::modular::paths::gather::{Signals, gather};
+use mrt_dictionary::modular::surface::output_grid::OutputGrid;
+use mrt_dictionary::modular::surface::walls::cube::texel_at;
 use mrt_runtime::low_level::level::shape::Hole;
 use mrt_runtime::low_level::modular::path::{Crossing, Word, response_frame};
-use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::{Random, exact_of, floor_plan, in_level_order, largest_difference};
+use mrt_runtime::{Bounces, Coupling, Dictionary, Frame, FrameConfig};
+use mrt_tests::{
+    FrameForTests, Random, baked, configured, corridor, exact_of, floor_plan, from_level_order,
+    in_level_order, largest_apart, lossless, ring, set_lightfields,
+};
 use std::sync::OnceLock;
 
 const RESOLUTION: usize = 3;
 
-/// As many modes of everything as there are texels.
+/// A dictionary with as many modes of everything as a closed cube has texels.
 fn full_rank() -> &'static Dictionary {
     static DICTIONARY: OnceLock<Dictionary> = OnceLock::new();
     DICTIONARY.get_or_init(|| {
-        let mut config = BakeConfig::preset("standard").expect("a preset");
-        let all = 6 * RESOLUTION * RESOLUTION;
-        config.resolution = RESOLUTION;
-        config.modes = all;
-        config.coupling.emission_modes = all;
-        config.coupling.response_modes = all;
-        config.coupling.foreign_modes = all;
-        config.outputs.probes = 0;
-        // The lightfields are not what is looked at.
-        config.lightfield.positions = 4;
-        config.lightfield.directions = 8;
-        config.lightfield.lightfield_modes = 8;
-        config.check().expect("in range");
-        bake(&config, &Progress::silent()).expect("nobody cancels")
+        baked("standard", "cubes-2d", |config| {
+            let all = 6 * RESOLUTION * RESOLUTION;
+            config.resolution = RESOLUTION;
+            config.modes = all;
+            config.coupling.emission_modes = all;
+            config.coupling.response_modes = all;
+            config.coupling.foreign_modes = all;
+            config.outputs.probes = 0;
+            // No light of these tests comes by lightfields.
+            set_lightfields(config, 4, 8, 8);
+        })
     })
 }
+
+/// Largest error of irradiance whose values are about 0.5 in the lit block.
+const FULL_RANK: f64 = 1e-4;
 
 #[test]
 fn all_modes_together_are_exact_form_factors_through_openings() {
     let mut random = Random(17);
-    let ring = [
-        [0, 0],
-        [1, 0],
-        [2, 0],
-        [2, 1],
-        [2, 2],
-        [1, 2],
-        [0, 2],
-        [0, 1],
-    ];
-    let plans: [(&str, &[[i32; 2]]); 6] = [
-        ("cube", &[[0, 0]]),
-        ("pair", &[[0, 0], [1, 0]]),
-        ("corridor", &[[0, 0], [1, 0], [2, 0], [3, 0]]),
-        ("T", &[[0, 0], [1, 0], [2, 0], [1, 1], [1, 2]]),
-        ("room", &[[0, 0], [1, 0], [0, 1], [1, 1], [2, 1], [2, 0]]),
-        ("ring", &ring),
+    let plans: [(&str, Vec<[i32; 2]>); 6] = [
+        ("cube", corridor(1)),
+        ("pair", corridor(2)),
+        ("corridor", corridor(4)),
+        ("T", vec![[0, 0], [1, 0], [2, 0], [1, 1], [1, 2]]),
+        ("room", vec![[0, 0], [1, 0], [0, 1], [1, 1], [2, 1], [2, 0]]),
+        ("ring", ring()),
     ];
     for (name, cells) in plans {
-        let level = floor_plan(cells, 1.0);
-        let scene = Scene::assemble(&level, full_rank(), &exact_config()).expect("it fits");
+        let level = floor_plan(&cells, 1.0);
+        let scene = configured(&level, full_rank(), &lossless(Coupling::Table));
         let exact = exact_of(&level, RESOLUTION);
         let transport = Transport::build(&exact);
-        // Light on one block at a time, so that each path counts for itself.
+        // One block is lit at a time, so that no path hides the error of another.
         for source in 0..cells.len() {
             let mut light = vec![[0.0f32; 3]; exact.texel_count()];
             for wall in exact.walls().iter().filter(|wall| wall.block == source) {
@@ -88,13 +75,14 @@ fn all_modes_together_are_exact_form_factors_through_openings() {
                     })
                 })
                 .collect();
-            let found = first_bounce(&level, &scene, &light);
+            let mut frame = Frame::new(&scene, FrameConfig::default());
+            frame.light_from(&from_level_order(&level, &scene, &light), Bounces::Count(1));
+            let found = in_level_order(&level, &scene, &frame.indirect());
             for (target, wall) in exact.walls().iter().enumerate() {
                 let range = wall.first_texel..wall.first_texel + RESOLUTION * RESOLUTION;
-                let largest =
-                    |s: &[[f32; 3]]| s.as_flattened().iter().fold(0.0f32, |m, x| m.max(x.abs()));
-                let apart = largest_difference(&found[range.clone()], &expected[range.clone()])
-                    * f64::from(largest(&expected[range]));
+                let [found, expected] =
+                    [&found, &expected].map(|light| light[range.clone()].as_flattened());
+                let apart = f64::from(largest_apart(found, expected));
                 assert!(
                     apart < FULL_RANK,
                     "{name}, block {source}, wall {target}: {apart:.1e}"
@@ -104,38 +92,7 @@ fn all_modes_together_are_exact_form_factors_through_openings() {
     }
 }
 
-/// Values are about 0.5 in the own block.
-const FULL_RANK: f64 = 1e-4;
-
-/// One bounce of direct light given in the order of the level.
-fn first_bounce(
-    level: &mrt_runtime::Level,
-    scene: &mrt_runtime::Scene,
-    light: &[[f32; 3]],
-) -> Vec<[f32; 3]> {
-    let mut direct = vec![0.0; 3 * scene.texel_count()];
-    let mut next = light.iter();
-    for (index, block) in level.blocks.iter().enumerate() {
-        let texels = &scene.level.blocks[index].texels;
-        for face in Face::ALL.into_iter().filter(|&face| !block.is_open(face)) {
-            for k in 0..RESOLUTION * RESOLUTION {
-                let texel = scene
-                    .level
-                    .level_texel(BlockIndex::new(index), face, k / RESOLUTION, k % RESOLUTION)
-                    .expect("walls have texels");
-                let value = next.next().expect("one value a texel");
-                for c in 0..3 {
-                    direct[3 * texels.start + c * texels.len() + texel] = value[c];
-                }
-            }
-        }
-    }
-    let mut frame = Frame::new(scene, FrameConfig::default());
-    frame.light_from(&direct, Bounces::Count(1));
-    in_level_order(level, scene, &frame.indirect())
-}
-
-/// A path run backwards, and the symmetry that takes the axes of the path to its.
+/// The reversed path, and the symmetry from the axes of the path to the axes of the reversed path.
 fn reversed(word: &Word) -> (Word, CubeSymmetry) {
     let letters = [Face::PosZ, Face::PosX, Face::PosY];
     let mut image: [Option<Face>; 3] = [None; 3];
@@ -152,7 +109,8 @@ fn reversed(word: &Word) -> (Word, CubeSymmetry) {
             hole: crossing.hole,
         });
     }
-    // Headings are reversed; axes that no crossing has go to what is left, and keep up where they can.
+    // Light on the reversed path has the opposite heading. An axis that no crossing has stays where it is, or goes to a free
+    // axis; the vertical axis is the first to choose.
     let mut taken: Vec<usize> = image.iter().flatten().map(|face| face.axis()).collect();
     let mut images = [Face::PosX; 3];
     for axis in [1, 0, 2] {
@@ -174,9 +132,10 @@ fn reversed(word: &Word) -> (Word, CubeSymmetry) {
     (back, symmetry)
 }
 
-/// Transport from wall to wall along a path and back, both per unit of area.
+/// Transport between each two walls along a path and along the reversed path, per unit of area. The last pair is the sum
+/// over all walls.
 fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
-    let setup = Gather {
+    let setup = OutputGrid {
         resolution,
         probes: 0,
         vector: false,
@@ -187,7 +146,7 @@ fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
     let (frame, frame_back) = (response_frame(word), response_frame(&back));
     let emitter: Vec<(Face, DVec3)> = EMITTER.texels(resolution).collect();
     let receiver: Vec<(Face, DVec3)> = RECEIVER.texels(resolution).collect();
-    // Where each texel of the path is on its way back.
+    // The texels that send and receive on the reversed path.
     let sends: Vec<usize> = receiver
         .iter()
         .map(|&(face, point)| {
@@ -212,7 +171,7 @@ fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
             / per_wall as f64
     };
     let forth = |r: usize, e: usize| -> f64 { there[(r, e)] };
-    let back = |r: usize, e: usize| -> f64 { at(&here, receives[e], sends[r]) };
+    let back = |r: usize, e: usize| -> f64 { here[(receives[e], sends[r])] };
     let mut pairs: Vec<(f64, f64)> = (0..walls)
         .flat_map(|to| (0..walls).map(move |from| (to, from)))
         .map(|(to, from)| (sum(&forth, to, from), sum(&back, to, from)))
@@ -224,16 +183,15 @@ fn exchanged(word: &Word, resolution: usize) -> Vec<(f64, f64)> {
     pairs
 }
 
-fn at(matrix: &Matrix<f64>, row: usize, column: usize) -> f64 {
-    matrix[(row, column)]
-}
+/// Largest difference between both ways at 8² texels, relative to all transport of the path.
+const RECIPROCITY: f64 = 0.02;
 
 #[test]
-fn light_goes_back_the_way_it_came() {
+fn transport_along_a_path_is_reciprocal() {
     let words = Word::all(3, 2, &Hole::ALL, true);
     assert!(words.iter().any(|word| word.name() == "zxy"));
     for word in &words {
-        // Texels receive at their centres and send from all over, so both ways agree as texels shrink only.
+        // A texel receives at its centre and sends from its whole area, so both ways agree only in the limit of small texels.
         let errors = [4, 8].map(|resolution| {
             let pairs = exchanged(word, resolution);
             let total = pairs.last().expect("the sum").0;
@@ -242,17 +200,5 @@ fn light_goes_back_the_way_it_came() {
         });
         println!("{}: {:.4} {:.4}", word.name(), errors[0], errors[1]);
         assert!(errors[1] < RECIPROCITY, "{}: {errors:?}", word.name());
-    }
-}
-
-/// At 8², of all that the path carries.
-const RECIPROCITY: f64 = 0.02;
-
-/// Operators as they are, to compare with exact ones.
-fn exact_config() -> AssembleConfig {
-    AssembleConfig {
-        transport_storage: mrt_core::storage::Storage::F32,
-        negligible: Some(0.0),
-        ..AssembleConfig::default()
     }
 }

@@ -1,26 +1,22 @@
-//! Tunnels of round tubes against a path tracer on a fine mesh of the same tunnel, and against physics.
+//! Tunnels of round tubes, against a path tracer on a fine mesh of the same tunnel and against physics.
 
 use glam::{DVec3, Vec3};
-use mrt_core::geometry::cube::{CubeRotation, Face};
-use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_core::geometry::mesh::{Material, TriangleMesh};
+use mrt_core::geometry::cube::Face;
+use mrt_core::geometry::mesh::TriangleMesh;
 use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
-use mrt_dictionary::config::BakeConfig;
-use mrt_dictionary::modular::bake::bake;
-use mrt_dictionary::progress::Progress;
-use mrt_runtime::BlockIndex;
-use mrt_runtime::FrameConfig;
-use mrt_runtime::blocks::{Block, Connection, Opening, Shape};
-use mrt_runtime::low_level::level::shape::shape_set;
-use mrt_runtime::{AssembleConfig, Bounces, Dictionary, Frame, Level, Light, LightError, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::normal_of;
-use mrt_tests::position_of;
+use mrt_runtime::blocks::Opening;
+use mrt_runtime::{
+    AssembleConfig, BlockIndex, Bounces, Dictionary, Frame, FrameConfig, Level, Light, LightError,
+    Scene,
+};
+use mrt_tests::tunnels::{ALBEDO, tunnel};
+use mrt_tests::{
+    FrameForTests, bake_of, baked, changed, configured, patch_mesh, point_and_normal, position_of,
+    red, set_lightfields, solved, uniformly_lit, with_threads,
+};
 use std::sync::OnceLock;
 
-const ALBEDO: f32 = 0.6;
-
-/// Left and right bends with straight tubes between them.
+/// A walk with bends to the left and to the right, and straight tubes between them.
 const TUNNEL: [[i32; 3]; 10] = [
     [0, 0, 0],
     [1, 0, 0],
@@ -34,74 +30,16 @@ const TUNNEL: [[i32; 3]; 10] = [
     [5, 0, 0],
 ];
 
-/// A bake that takes seconds: 12² texels a chart, and half of the lightfield samples.
+/// A bake that takes seconds: 12² texels a chart, and half of the preset's lightfield samples along each axis.
 fn small_dictionary() -> &'static Dictionary {
-    static BAKED: OnceLock<Dictionary> = OnceLock::new();
-    BAKED.get_or_init(|| {
-        let mut config = BakeConfig::preset_for("standard", "cylinders").expect("a preset");
-        config.resolution = 12;
-        config.lightfield.positions = 8;
-        config.lightfield.directions = 16;
-        bake(&config, &Progress::silent()).expect("nobody cancels")
-    })
-}
-
-/// Tubes along a walk from cell to neighbouring cell; its ends lead outside.
-fn tunnel(cells: &[[i32; 3]]) -> Level {
-    let shapes = shape_set("cylinders").expect("a set");
-    let heading = |k: usize| {
-        let step: [i32; 3] = std::array::from_fn(|axis| cells[k + 1][axis] - cells[k][axis]);
-        let step = DVec3::from_array(step.map(f64::from));
-        Face::ALL
-            .into_iter()
-            .find(|face| face.outward() == step)
-            .expect("neighbouring cells")
-    };
-    let last = cells.len() - 1;
-    let mut level = Level::default();
-    for (k, cell) in cells.iter().enumerate() {
-        let entered = match k {
-            0 => heading(0).opposite(),
-            _ => heading(k - 1).opposite(),
-        };
-        let left = heading(k.min(last - 1));
-        let open = [entered, left];
-        let (shape, orientation) = placed(&shapes, open);
-        let warp = Hexahedron::cell(DVec3::from_array(cell.map(f64::from)));
-        let albedo = Vec3::splat(ALBEDO);
-        level
-            .blocks
-            .push(Block::new(shape, orientation, warp, albedo));
-        if k < last {
-            level.connections.push(Connection {
-                a: Opening {
-                    block: k,
-                    face: heading(k),
-                },
-                b: Opening {
-                    block: k + 1,
-                    face: heading(k).opposite(),
-                },
-            });
-        }
-    }
-    level
-}
-
-/// The shape and the rotation that open towards both faces, upright if that is possible.
-fn placed(shapes: &[&'static Shape], open: [Face; 2]) -> (&'static Shape, CubeRotation) {
-    (0..4)
-        .map(CubeRotation::about_y)
-        .chain(CubeRotation::all())
-        .find_map(|rotation| {
-            shapes.iter().find_map(|&shape| {
-                let fits = |o: &mrt_runtime::low_level::level::shape::Aperture| {
-                    open.contains(&rotation.face(o.face))
-                };
-                shape.openings.iter().all(fits).then_some((shape, rotation))
-            })
+    static DICTIONARY: OnceLock<Dictionary> = OnceLock::new();
+    DICTIONARY.get_or_init(|| {
+        baked("standard", "cylinders", |config| {
+            config.resolution = 12;
+            config.lightfield.positions = 8;
+            config.lightfield.directions = 16;
         })
-        .expect("a tube joins any two faces")
+    })
 }
 
 fn assembled(level: &Level, dictionary: &Dictionary) -> Scene {
@@ -109,39 +47,22 @@ fn assembled(level: &Level, dictionary: &Dictionary) -> Scene {
         max_depth: 10,
         ..AssembleConfig::default()
     };
-    Scene::assemble(level, dictionary, &config).expect("a level of tubes")
+    configured(level, dictionary, &config)
 }
 
 fn lamp(position: DVec3) -> Light {
-    Light::Sphere {
-        position: position.as_vec3(),
-        radius: 0.1,
-        intensity: Vec3::ONE,
-    }
+    Light::sphere(position.as_vec3(), 0.1, Vec3::ONE)
 }
 
 fn middle(cell: [i32; 3]) -> DVec3 {
     DVec3::from_array(cell.map(f64::from)) + 0.5
 }
 
-/// One channel of indirect irradiance, texel by texel.
-fn indirect(scene: &Scene, frame: &Frame) -> Vec<f64> {
-    let mut values = Vec::with_capacity(scene.texel_count());
-    for (index, block) in scene.level.blocks.iter().enumerate() {
-        let light = |k| frame.indirect_at(BlockIndex::new(index), k);
-        let of_texel = |k| f64::from(light(k).expect("a texel").x);
-        values.extend((0..block.texels.len()).map(of_texel));
-    }
-    values
-}
-
 fn lit(scene: &Scene, lights: &[Light], bounces: Bounces) -> Vec<f64> {
-    let mut frame = Frame::new(scene, FrameConfig::default());
-    frame.light_with(lights, bounces);
-    indirect(scene, &frame)
+    red(&solved(scene, lights, bounces))
 }
 
-/// Area of each texel, in square metres of unit blocks.
+/// Area of every texel, for unit blocks, m².
 fn areas(scene: &Scene) -> Vec<f64> {
     let mut areas = Vec::with_capacity(scene.texel_count());
     for block in &scene.level.blocks {
@@ -156,41 +77,26 @@ fn areas(scene: &Scene) -> Vec<f64> {
     areas
 }
 
-/// Facets along each axis of a chart: at 64 facets lie up to 1e-4 inside the wall.
-const FACETS: usize = 64;
+/// Facets along each axis of a chart. Facets lie up to 1e-4 inside the wall.
+const FACETS: u32 = 64;
 
-/// How far receivers are lifted off the wall, so that they are not behind its facets.
+/// Distance of receivers from the wall, which keeps them before its facets.
 const LIFT: f64 = 2e-4;
 
 fn mesh(scene: &Scene) -> TriangleMesh {
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for block in &scene.level.blocks {
-        for face in block.shape.walls() {
-            let start = positions.len() as u32;
-            let row = FACETS as u32 + 1;
-            for j in 0..=FACETS {
-                for i in 0..=FACETS {
-                    let [u, v] = [i, j].map(|k| k as f64 / FACETS as f64);
-                    let point = block.shape.wall_point(face, u, v).position;
-                    positions.push(block.warp.point(point).as_vec3());
-                }
+    let blocks = scene.level.blocks.iter();
+    let charts = blocks.flat_map(|block| {
+        block.shape.walls().map(move |face| {
+            move |u, v| {
+                let point = block.shape.wall_point(face, u, v).position;
+                block.warp.point(point)
             }
-            for cell in 0..(FACETS * FACETS) as u32 {
-                let a = start + cell / FACETS as u32 * row + cell % FACETS as u32;
-                triangles.push([a, a + 1, a + row + 1]);
-                triangles.push([a, a + row + 1, a + row]);
-            }
-        }
-    }
-    let mut mesh = TriangleMesh::from_triangles(positions, triangles);
-    mesh.materials = vec![Material {
-        name: "paint".into(),
-        albedo: Vec3::splat(ALBEDO),
-    }];
-    mesh
+        })
+    });
+    patch_mesh(charts, FACETS, ALBEDO)
 }
 
-/// Two independent estimates of one bounce of light at all texels.
+/// Two independent estimates of all texels' irradiance after one bounce.
 fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
     let light = SphereLight {
         position,
@@ -199,12 +105,7 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
     };
     let traced = PathScene::new(&mesh(scene), vec![light], &[]).expect("a sound mesh");
     let receivers: Vec<(DVec3, DVec3)> = (0..scene.texel_count())
-        .map(|k| {
-            (
-                position_of(&scene, k).as_dvec3(),
-                normal_of(&scene, k).as_dvec3(),
-            )
-        })
+        .map(|k| point_and_normal(scene, k))
         .map(|(p, n)| (p + n * LIFT, n))
         .collect();
     [1, 2].map(|seed| {
@@ -218,8 +119,10 @@ fn traced(scene: &Scene, position: DVec3, paths: u32) -> [Vec<f64>; 2] {
     })
 }
 
-/// Relative L2 error by area over a range of blocks. Noise of the reference has no part in it: it is independent in
-/// the two estimates, so (x - a)(x - b) has the mean (x - truth)².
+/// Relative L2 error of some texels, weighted by area.
+///
+/// The noise of the reference adds nothing to it. Noise is independent in the two estimates a and b, so (x - a)(x - b) has
+/// the mean (x - exact)².
 fn error(
     found: &[f64],
     reference: &[Vec<f64>; 2],
@@ -235,7 +138,7 @@ fn error(
     (miss.max(0.0) / norm).sqrt()
 }
 
-/// Prints errors by hop and returns the largest over all texels of the tunnel, of two lights.
+/// The larger error over all texels of a tunnel with two lights, one after the other. Prints errors block by block.
 fn worst_error(dictionary: &Dictionary, cells: &[[i32; 3]], paths: u32) -> f64 {
     let scene = assembled(&tunnel(cells), dictionary);
     let areas = areas(&scene);
@@ -268,23 +171,22 @@ fn worst_error(dictionary: &Dictionary, cells: &[[i32; 3]], paths: u32) -> f64 {
 
 #[test]
 fn a_tunnel_agrees_with_a_path_tracer() {
-    // The bound of the standard preset, which the ignored test bakes, holds for this small one too.
+    // The bound is that of the standard preset, which the ignored test bakes.
     let worst = worst_error(small_dictionary(), &TUNNEL, 128);
     assert!(worst < 0.06, "{worst}");
 }
 
 #[test]
-#[ignore = "bakes the standard preset, which takes minutes: cargo test --release --test tunnel -- --ignored"]
+#[ignore = "bakes the standard preset of tubes, which takes minutes"]
 fn a_tunnel_of_the_standard_preset_agrees_with_a_path_tracer() {
-    let config = BakeConfig::preset_for("standard", "cylinders").expect("a preset");
-    let dictionary = bake(&config, &Progress::silent()).expect("nobody cancels");
+    let dictionary = baked("standard", "cylinders", |_| ());
     let worst = worst_error(&dictionary, &TUNNEL, 32);
     assert!(worst < 0.06, "{worst}");
-    // Measured 13.4 %: texels of 1/32 lie nearer to the rim than the lightfields' positions of 1/12 can tell.
+    // Measured: 13.4 %. Texels of 1/32 are nearer to the rim than positions of the lightfields, 1/12 apart, can resolve.
     assert!(seam(&dictionary) < 0.15);
 }
 
-/// Light of a level and of its image under a map of space, texel by texel: relative L2.
+/// Relative L2 difference between the light of a level and of its image under a map of space.
 fn image_error(level: &Level, image: &Level, map: impl Fn(DVec3) -> DVec3) -> f64 {
     let light = DVec3::new(2.4, 0.6, 1.45);
     let (here, there) = (
@@ -303,7 +205,7 @@ fn image_error(level: &Level, image: &Level, map: impl Fn(DVec3) -> DVec3) -> f6
                 .clone()
                 .min_by(|a, b| distance(a).total_cmp(&distance(b)))
                 .expect("a tube has texels");
-            // Positions are single precision.
+            // Positions are in single precision.
             assert!(distance(&twin) < 1e-5);
             miss += (found[texel] - mapped[twin]).powi(2);
             norm += found[texel].powi(2);
@@ -318,18 +220,18 @@ fn a_mirrored_tunnel_has_mirrored_light() {
     let mirror = |p: DVec3| DVec3::new(p.x, p.y, 1.0 - p.z);
     let error = image_error(&tunnel(&TUNNEL), &tunnel(&mirrored), mirror);
     println!("mirrored: {error:.1e}");
-    // The operators hold the mirrors of the shapes up to the rounding of f32, some 1e-6 a product.
+    // Operators keep the mirror symmetry of shapes up to rounding of `f32`, about 1e-6 for each product.
     assert!(error < 1e-4, "{error}");
 }
 
 #[test]
-fn bends_up_and_down_are_bends_to_the_side() {
+fn bends_up_and_down_act_like_bends_to_the_side() {
     // A quarter turn about x: z becomes y.
     let turned = TUNNEL.map(|[x, y, z]| [x, z, -y]);
     let turn = |p: DVec3| DVec3::new(p.x, p.z, 1.0 - p.y);
     let error = image_error(&tunnel(&TUNNEL), &tunnel(&turned), turn);
     println!("turned: {error:.1e}");
-    // A straight tube may be rolled between bends that are not: what the basis loses in that exchange.
+    // A straight tube may be rolled between bends that are not. The error is what the basis loses in that exchange.
     assert!(error < 0.01, "{error}");
 }
 
@@ -337,13 +239,10 @@ fn bends_up_and_down_are_bends_to_the_side() {
 fn a_white_furnace_stays_white_in_a_long_tunnel() {
     let cells: [[i32; 3]; 9] = std::array::from_fn(|x| [x as i32, 0, 0]);
     let scene = assembled(&tunnel(&cells), small_dictionary());
-    let mut frame = Frame::new(&scene, FrameConfig::default());
-    let direct = vec![1.0; 3 * scene.texel_count()];
-    frame.light_from(&direct, Bounces::Count(1));
-    let found = indirect(&scene, &frame);
+    let found = red(&uniformly_lit(&scene, Bounces::Count(1)));
     for texel in scene.level.blocks[4].texels.clone() {
-        // Of the light at the middle, 0.1 % comes in through the ends, 4 widths and more away; the rest is
-        // the bases' error at their borders.
+        // In the middle, 0.1 % of the light is missing through the ends, four widths away. The rest of the tolerance is the
+        // error of the bases at the borders of tubes.
         assert!(
             (found[texel] / f64::from(ALBEDO) - 1.0).abs() < 0.03,
             "{}",
@@ -353,7 +252,7 @@ fn a_white_furnace_stays_white_in_a_long_tunnel() {
 }
 
 #[test]
-fn energy_never_grows() {
+fn each_bounce_adds_no_more_energy_than_the_one_before() {
     let mut level = tunnel(&TUNNEL);
     for block in &mut level.blocks {
         block.albedo = [Vec3::ONE; 6];
@@ -367,8 +266,8 @@ fn energy_never_grows() {
     let mut added = f64::INFINITY;
     for passes in 1..40 {
         frame.light_with(&lights, Bounces::Count(passes));
-        let now = flux(&indirect(&scene, &frame));
-        // Each bounce brings less than the one before, up to what f32 leaves of the sum.
+        let now = flux(&red(&frame));
+        // The tolerance is rounding of `f32` in the sum.
         assert!(now - before <= added + 1e-5 * now, "{passes}");
         (added, before) = (now - before, now);
     }
@@ -376,54 +275,69 @@ fn energy_never_grows() {
 
 #[test]
 fn joined_tubes_have_no_seam() {
-    // Measured 4.7 %, with 12 texels and 8 positions of the lightfields across a tube.
+    // Measured: 4.7 %, with 12 texels and 8 positions of the lightfields across a tube.
     let seam = seam(small_dictionary());
     assert!(seam < 0.06, "{seam}");
 }
 
-/// Jump of the light between joined tubes, extrapolated to their opening from both sides: root mean square over the
-/// rims, over the mean of the level.
+/// The two texels of a row that are nearest to an opening.
+struct RowEnd {
+    /// World position of the nearest.
+    place: DVec3,
+    nearest: usize,
+    next: usize,
+}
+
+impl RowEnd {
+    /// Light in the opening, extrapolated from the two texels.
+    fn extrapolated(&self, light: &[f64]) -> f64 {
+        1.5 * light[self.nearest] - 0.5 * light[self.next]
+    }
+}
+
+/// The ends of all rows of a block at an opening.
+fn row_ends(scene: &Scene, opening: &Opening) -> Vec<RowEnd> {
+    let resolution = scene.level.resolution;
+    let block = &scene.level.blocks[opening.block];
+    let side = block.orientation.inverse().face(opening.face);
+    let point = |texel: usize| position_of(scene, texel).as_dvec3();
+    let plane = block.warp.point(side.point(0.5, 0.5));
+    let out = (plane - block.warp.center()).normalize();
+    let depth = |texel: usize| (plane - point(texel)).dot(out);
+    let rows = block.texels.clone().step_by(resolution);
+    rows.map(|first| {
+        let last = first + resolution - 1;
+        let (nearest, next) = if depth(first) < depth(last) {
+            (first, first + 1)
+        } else {
+            (last, last - 1)
+        };
+        RowEnd {
+            place: point(nearest),
+            nearest,
+            next,
+        }
+    })
+    .collect()
+}
+
+/// Jump of the light between joined tubes, extrapolated to their openings from both sides: root mean square over all rims,
+/// relative to the mean of the level.
 fn seam(dictionary: &Dictionary) -> f64 {
     let scene = assembled(&tunnel(&TUNNEL), dictionary);
-    let mut frame = Frame::new(&scene, FrameConfig::default());
-    let lights = [lamp(middle(TUNNEL[4]) + DVec3::new(0.1, 0.05, 0.1))];
-    frame.light_with(&lights, Bounces::Count(2));
-    let found = indirect(&scene, &frame);
+    let lamp = lamp(middle(TUNNEL[4]) + DVec3::new(0.1, 0.05, 0.1));
+    let found = lit(&scene, &[lamp], Bounces::Count(2));
     let mean = found.iter().sum::<f64>() / found.len() as f64;
-    let resolution = scene.level.resolution;
-    // The two texels nearest to an opening in each row, nearest first, with their places.
-    let rows = |block: usize, side: Face| -> Vec<(DVec3, [usize; 2])> {
-        let placed = &scene.level.blocks[block];
-        let point = |k: usize| position_of(&scene, placed.texels.start + k).as_dvec3();
-        let plane = placed.warp.point(side.point(0.5, 0.5));
-        let out = (plane - placed.warp.center()).normalize();
-        let depth = |k: usize| (plane - point(k)).dot(out);
-        (0..placed.texels.len() / resolution)
-            .map(|row| {
-                let (first, last) = (row * resolution, (row + 1) * resolution - 1);
-                let pair = if depth(first) < depth(last) {
-                    [first, first + 1]
-                } else {
-                    [last, last - 1]
-                };
-                (point(pair[0]), pair.map(|k| placed.texels.start + k))
-            })
-            .collect()
-    };
     let (mut squares, mut count) = (0.0, 0);
     for connection in &tunnel(&TUNNEL).connections {
-        let canonical = |end: &Opening| {
-            let placed = &scene.level.blocks[end.block];
-            rows(end.block, placed.orientation.inverse().face(end.face))
-        };
-        let (ours, theirs) = (canonical(&connection.a), canonical(&connection.b));
-        for (place, [a, further_a]) in &ours {
-            let (_, [b, further_b]) = theirs
+        let theirs = row_ends(&scene, &connection.b);
+        for ours in row_ends(&scene, &connection.a) {
+            let distance = |end: &RowEnd| end.place.distance(ours.place);
+            let twin = theirs
                 .iter()
-                .min_by(|p, q| p.0.distance(*place).total_cmp(&q.0.distance(*place)))
-                .expect("rows");
-            let jump =
-                1.5 * (found[*a] - found[*b]) - 0.5 * (found[*further_a] - found[*further_b]);
+                .min_by(|p, q| distance(p).total_cmp(&distance(q)))
+                .expect("tubes have rows");
+            let jump = ours.extrapolated(&found) - twin.extrapolated(&found);
             squares += jump * jump;
             count += 1;
         }
@@ -433,53 +347,71 @@ fn seam(dictionary: &Dictionary) -> f64 {
     seam
 }
 
-#[test]
-fn borders_of_the_lightmap_go_on_around_and_along_the_tunnel() {
-    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
-    let mut frame = Frame::new(&scene, FrameConfig::default());
-    frame.light_with(&[lamp(middle(TUNNEL[2]))], Bounces::Count(1));
-    // All places on the rims of charts, with what the lightmap says there.
-    let mut rims: Vec<(DVec3, [f32; 3], [usize; 2])> = Vec::new();
+/// A place on the rim of a chart.
+struct RimPoint {
+    /// World position.
+    place: DVec3,
+    /// What the lightmap shows there.
+    light: [f32; 3],
+    /// Block and face of the chart.
+    chart: (usize, Face),
+}
+
+/// Points along the rims of all charts, one beside each texel.
+fn rim_points(frame: &Frame) -> Vec<RimPoint> {
+    let scene = frame.scene();
+    let resolution = scene.level.resolution;
+    let mut points = Vec::new();
     for (index, block) in scene.level.blocks.iter().enumerate() {
         for face in block.shape.walls() {
-            for k in 0..scene.level.resolution {
-                let along = (k as f64 + 0.5) / scene.level.resolution as f64;
+            for k in 0..resolution {
+                let along = (k as f64 + 0.5) / resolution as f64;
                 for (u, v) in [(0.0, along), (1.0, along), (along, 0.0), (along, 1.0)] {
-                    let place = block
-                        .warp
-                        .point(block.shape.wall_point(face, u, v).position);
-                    let pixel = scene
-                        .atlas
-                        .pixel(BlockIndex::new(index), face, u as f32, v as f32);
-                    let light = scene
-                        .atlas
-                        .sample(frame.lightmap().pixels(), pixel.expect("a chart"));
-                    rims.push((place, light, [index, face.index()]));
+                    let point = block.shape.wall_point(face, u, v).position;
+                    let atlas = &scene.atlas;
+                    let pixel = atlas.pixel(BlockIndex::new(index), face, u as f32, v as f32);
+                    let pixel = pixel.expect("a chart");
+                    points.push(RimPoint {
+                        place: block.warp.point(point),
+                        light: atlas.sample(frame.lightmap().pixels(), pixel),
+                        chart: (index, face),
+                    });
                 }
             }
         }
     }
-    let brightest = rims.iter().fold(0f32, |most, rim| most.max(rim.1[0]));
+    points
+}
+
+#[test]
+fn the_lightmap_is_continuous_around_and_along_the_tunnel() {
+    let scene = assembled(&tunnel(&TUNNEL), small_dictionary());
+    let frame = solved(&scene, &[lamp(middle(TUNNEL[2]))], Bounces::Count(1));
+    let rims = rim_points(&frame);
+    let brightest = rims.iter().fold(0f32, |most, rim| most.max(rim.light[0]));
     let mut pairs = 0;
-    for (a, (place, light, tile)) in rims.iter().enumerate() {
-        for (other, there, other_tile) in &rims[a + 1..] {
-            if tile != other_tile && place.distance(*other) < 1e-9 {
-                // Means of the same two texels, with weights of 1/2 that f32 knows to 1e-5 in an image of this size.
+    for (k, a) in rims.iter().enumerate() {
+        for b in &rims[k + 1..] {
+            if a.chart != b.chart && a.place.distance(b.place) < 1e-9 {
+                // Both are means of the same two texels. In an image of this size, `f32` coordinates give the weights of 1/2
+                // to 1e-5.
                 let slack = 1e-5 * brightest;
                 assert!(
-                    (light[0] - there[0]).abs() <= slack,
-                    "{tile:?} {other_tile:?}"
+                    (a.light[0] - b.light[0]).abs() <= slack,
+                    "{:?} {:?}",
+                    a.chart,
+                    b.chart
                 );
                 pairs += 1;
             }
         }
     }
-    // Four rims along each of ten tubes, and nine discs of four charts.
+    // Four rims along each of ten tubes, and nine discs where two tubes of four charts meet.
     assert_eq!(pairs, (10 * 4 + 9 * 4) * scene.level.resolution);
 }
 
 #[test]
-fn an_unconnected_tube_reads_zero() {
+fn an_unconnected_tube_is_dark() {
     let mut level = tunnel(&TUNNEL[..4]);
     level.connections.pop();
     let scene = assembled(&level, small_dictionary());
@@ -509,19 +441,11 @@ fn a_light_outside_the_round_wall_is_skipped() {
 }
 
 #[test]
-fn the_bake_of_tubes_does_not_depend_on_threads() {
-    let mut config = BakeConfig::preset_for("mobile", "cylinders").expect("a preset");
-    config.resolution = 6;
-    config.lightfield.positions = 6;
-    config.lightfield.directions = 10;
-    config.lightfield.lightfield_modes = 24;
-    let bytes = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let baked = pool
-            .build()
-            .expect("threads")
-            .install(|| bake(&config, &Progress::silent()));
-        baked.expect("nobody cancels").to_bytes().expect("finite")
-    };
+fn the_number_of_threads_changes_no_bit_of_a_bake_of_tubes() {
+    let config = changed("mobile", "cylinders", |config| {
+        config.resolution = 6;
+        set_lightfields(config, 6, 10, 24);
+    });
+    let bytes = |threads| with_threads(threads, || bake_of(&config).to_bytes().expect("finite"));
     assert_eq!(bytes(1), bytes(3));
 }

@@ -1,24 +1,14 @@
-//! Many bounces between nearly white walls: they converge, from below, to what energy allows.
+//! Many bounces between nearly white walls converge from below to the bound of energy.
 
 use glam::Vec3;
-use mrt_runtime::FrameConfig;
 use mrt_runtime::low_level::modular::frame::config::MAX_PASSES;
-use mrt_runtime::{Bounces, Frame, Level, Light, Scene};
-use mrt_tests::FrameForTests;
+use mrt_runtime::{Bounces, Frame, FrameConfig, Level, Light};
 use mrt_tests::{
-    Random, assembled, by_texel, closed_floor_plans, floor_plan, random_cells, solved, sphere,
+    Flux, FrameForTests, Random, assembled, closed_floor_plans, floor_plan, random_cells, solved,
 };
 
-/// Sums over texels; blocks are unit cubes, so all texels have the same area.
-fn flux(scene: &Scene, signal: &[f32], channel: usize) -> f64 {
-    by_texel(scene, signal)
-        .iter()
-        .map(|e| f64::from(e[channel]))
-        .sum()
-}
-
-/// Levels of nearly white walls by name, with a light in the first cell: boxes, corridors, loops, open rooms and
-/// heaps of random cells, closed and with every fifth connection missing.
+/// Levels of nearly white walls, by name: boxes, corridors, loops, rooms and random cells, closed and with about every fifth
+/// connection missing.
 fn levels() -> Vec<(String, Level)> {
     let mut random = Random(99);
     let mut plans: Vec<(String, Vec<[i32; 2]>)> = closed_floor_plans()
@@ -41,13 +31,13 @@ fn levels() -> Vec<(String, Level)> {
 }
 
 fn lamp() -> Light {
-    sphere(Vec3::new(0.3, 0.6, 0.4), 0.1, Vec3::new(1.0, 0.5, 2.0))
+    Light::sphere(Vec3::new(0.3, 0.6, 0.4), 0.1, Vec3::new(1.0, 0.5, 2.0))
 }
 
-/// What frames let direct light gain, for the difference between texel centres and walls.
+/// Largest relative gain of direct light that frames allow, for the difference between centres of texels and whole walls.
 const SPOT_GAIN: f64 = 0.05;
 
-/// Texels are read in `f32`; a sum of some thousand of them, converged to 1e-6 of the brightest, is good to this.
+/// Relative error of a sum of some thousand `f32` texels that have converged to 1e-6 of the brightest.
 const FLUX_ROUNDING: f64 = 1e-4;
 
 #[test]
@@ -60,21 +50,18 @@ fn bounces_between_nearly_white_walls_converge_below_the_bound_of_energy() {
             limit: MAX_PASSES,
         };
         let frame = solved(&scene, &[lamp()], bounces);
-        assert!(
-            frame.last_report().passes() < MAX_PASSES,
-            "{name}: {}",
-            frame.last_report().passes()
-        );
+        let passes = frame.last_report().passes();
+        assert!(passes < MAX_PASSES, "{name}: {passes}");
+        let flux = Flux::unweighted(&frame);
+        let direct = flux.arrived(&frame.direct());
+        let indirect = flux.arrived(&frame.indirect());
         let mut share = 0.0f64;
         for channel in 0..3 {
-            let sent = flux(&scene, &frame.direct(), channel) * albedo;
+            let sent = direct[channel] * albedo;
             let bound = sent * (1.0 + SPOT_GAIN) / (1.0 - albedo);
-            share = share.max(flux(&scene, &frame.indirect(), channel) / bound);
+            share = share.max(indirect[channel] / bound);
         }
-        println!(
-            "{name}: {} passes, {share:.4} of the bound",
-            frame.last_report().passes()
-        );
+        println!("{name}: {passes} passes, {share:.4} of the bound");
         assert!(share <= 1.0 + FLUX_ROUNDING, "{name}: {share}");
     }
 }
@@ -84,11 +71,12 @@ fn every_bounce_adds_light_and_never_more_than_the_one_before() {
     for (name, level) in levels() {
         let scene = assembled(&level);
         let mut frame = Frame::new(&scene, FrameConfig::default());
+        let flux = Flux::unweighted(&frame);
         let (mut before, mut last) = (0.0, f64::MAX);
         for pass in 0..40 {
-            // A pass on the light of the frame before: the next of the iterates that `Converged` goes through.
+            // Feedback is one pass on the light of the frame before, so these are the iterates of `Converged`.
             frame.light_with(&[lamp()], Bounces::Feedback);
-            let now = flux(&scene, &frame.indirect(), 0);
+            let [now, ..] = flux.arrived(&frame.indirect());
             let added = now - before;
             let rounding = FLUX_ROUNDING * now;
             assert!(added >= -rounding, "{name}, pass {pass}: {added} of {now}");
@@ -102,7 +90,7 @@ fn every_bounce_adds_light_and_never_more_than_the_one_before() {
 }
 
 #[test]
-fn walls_that_lose_nothing_gain_nothing_either() {
+fn walls_that_absorb_nothing_create_no_light() {
     for cells in [vec![[0, 0]], vec![[0, 0], [1, 0], [1, 1]]] {
         let mut level = floor_plan(&cells, 1.0);
         for (mixed, name) in [(false, "white"), (true, "one wall darker")] {
@@ -115,11 +103,14 @@ fn walls_that_lose_nothing_gain_nothing_either() {
                 limit: MAX_PASSES,
             };
             let frame = solved(&scene, &[lamp()], bounces);
+            let passes = f64::from(frame.last_report().passes());
+            let flux = Flux::unweighted(&frame);
+            let direct = flux.arrived(&frame.direct());
+            let indirect = flux.arrived(&frame.indirect());
             for channel in 0..3 {
                 // No bounce brings more than the direct light.
-                let direct = flux(&scene, &frame.direct(), channel) * (1.0 + SPOT_GAIN);
-                let bound = f64::from(frame.last_report().passes()) * direct;
-                let found = flux(&scene, &frame.indirect(), channel);
+                let bound = passes * (direct[channel] * (1.0 + SPOT_GAIN));
+                let found = indirect[channel];
                 println!(
                     "{} cells, {name}, channel {channel}: {:.4}",
                     cells.len(),

@@ -1,29 +1,27 @@
-//! What must not change a result: order and place of blocks, units, the way a light is split up.
+//! Light does not depend on the order and place of blocks, on units, or on how a light is split up.
 
 use glam::{DMat3, DVec3, Vec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_runtime::{AssembleConfig, Bounces, Level, Light, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::normal_of;
-use mrt_tests::position_of;
 use mrt_tests::{
-    CONVERGED, Random, by_texel, corridor, default_dictionary, floor_plan, largest_difference,
-    solved, sphere,
+    CONVERGED, FrameForTests, Random, by_texel, configured, corridor, default_dictionary,
+    floor_plan, largest_difference, matched, solved,
 };
-use std::collections::HashMap;
 
-/// Sums of some thousand products in `f32`, in another order or of other last bits; over ten bounces.
+/// Tolerance for sums of some thousand products in `f32`, in another order or with other last bits, over ten bounces.
 const ROUNDING: f64 = 1e-5;
 
-/// What an opening emits is sampled along rays. Where a ray meets the edge between two texels, rounding decides
-/// which one it sees, and probably decides differently at another opening of the same shape. Measured: 1.2e-4 for
-/// quarter turns, which exchange the openings of cross blocks, 3.7e-5 for a mirrored corridor.
+/// Tolerance where light comes through other openings of the same shape.
+///
+/// What an opening emits is sampled along rays. Where a ray meets the edge between two texels, rounding decides which of them
+/// it sees, and may decide otherwise at another opening. Measured: 1.2e-4 for quarter turns, which exchange the openings of
+/// cross blocks, and 3.7e-5 for a mirrored corridor.
 const GRID: f64 = 5e-4;
 
 const TEN: Bounces = Bounces::Count(10);
 
-/// A loop with a dead end and all kinds of blocks but the closed one.
+/// A loop and a dead end, with blocks of all shapes but the closed one.
 const CELLS: [[i32; 2]; 11] = [
     [0, 0],
     [1, 0],
@@ -38,11 +36,11 @@ const CELLS: [[i32; 2]; 11] = [
     [4, 1],
 ];
 
+/// Cells whose floors and ceilings have random colours, by cell. Their colours mean the same after a rotation about +Y.
 fn painted(cells: &[[i32; 2]]) -> Level {
     let mut level = floor_plan(cells, 0.7);
     for (block, &[x, z]) in level.blocks.iter_mut().zip(cells) {
         for (face, albedo) in Face::ALL.into_iter().zip(&mut block.albedo) {
-            // Floors and ceilings only: their colours mean the same after a rotation about +Y.
             if face.axis() == 1 {
                 let mut random = Random((x * 100 + z * 10 + face.index() as i32) as u64);
                 let mut value = || random.unit() as f32;
@@ -57,46 +55,22 @@ const LIGHTS: [Vec3; 2] = [Vec3::new(0.3, 0.6, 0.4), Vec3::new(2.6, 0.3, 1.7)];
 
 fn two_lights() -> [Light; 2] {
     [
-        sphere(LIGHTS[0], 0.1, Vec3::new(3.0, 2.0, 1.0)),
-        sphere(LIGHTS[1], 0.2, Vec3::new(0.5, 1.0, 2.0)),
+        Light::sphere(LIGHTS[0], 0.1, Vec3::new(3.0, 2.0, 1.0)),
+        Light::sphere(LIGHTS[1], 0.2, Vec3::new(0.5, 1.0, 2.0)),
     ]
 }
 
+/// The scene of a level and its indirect light by texel.
 fn indirect(level: &Level, lights: &[Light], bounces: Bounces) -> (Scene, Vec<[f32; 3]>) {
-    // What is left out of far light may differ where two parts of it are the same size.
+    // Nothing is left out of far light: of two parts of the same size, either could be left out.
     let config = AssembleConfig {
         negligible: Some(0.0),
         ..AssembleConfig::default()
     };
-    let scene = Scene::assemble(level, default_dictionary(), &config).expect("it fits");
+    let scene = configured(level, default_dictionary(), &config);
     let frame = solved(&scene, lights, bounces);
     let signal = by_texel(&scene, &frame.indirect());
     (scene, signal)
-}
-
-/// Place and direction of a texel as whole numbers: texel centres are multiples of 1/32 at 16².
-fn place(scene: &Scene, texel: usize, map: impl Fn(Vec3) -> Vec3) -> [i32; 6] {
-    let position = map(position_of(&scene, texel)) * 64.0;
-    let normal = map(normal_of(&scene, texel)) - map(Vec3::ZERO);
-    let whole = |v: Vec3| v.round().as_ivec3().to_array();
-    let ([a, b, c], [d, e, f]) = (whole(position), whole(normal));
-    [a, b, c, d, e, f]
-}
-
-/// The second signal in the first one's order, texels matched by place after `map` of the first.
-fn matched(
-    first: &Scene,
-    second: &Scene,
-    signal: &[[f32; 3]],
-    map: impl Fn(Vec3) -> Vec3 + Copy,
-) -> Vec<[f32; 3]> {
-    let by_place: HashMap<[i32; 6], usize> = (0..second.texel_count())
-        .map(|texel| (place(second, texel, |p| p), texel))
-        .collect();
-    assert_eq!(by_place.len(), second.texel_count(), "places are distinct");
-    (0..first.texel_count())
-        .map(|texel| signal[by_place[&place(first, texel, map)]])
-        .collect()
 }
 
 #[test]
@@ -105,9 +79,7 @@ fn the_order_of_blocks_does_not_matter() {
     let mut random = Random(7);
     for _ in 0..3 {
         let mut cells = CELLS.to_vec();
-        for k in (1..cells.len()).rev() {
-            cells.swap(k, random.below(k + 1));
-        }
+        random.shuffle(&mut cells);
         let (other, found) = indirect(&painted(&cells), &two_lights(), TEN);
         let found = matched(&scene, &other, &found, |p| p);
         let apart = largest_difference(&found, &expected);
@@ -119,13 +91,13 @@ fn the_order_of_blocks_does_not_matter() {
 fn quarter_turns_of_the_level_turn_its_light() {
     let (scene, expected) = indirect(&painted(&CELLS), &two_lights(), TEN);
     let mut cells = CELLS.to_vec();
-    let turns: [fn(Vec3) -> Vec3; 3] = [
-        |p| Vec3::new(p.z, p.y, -p.x),
-        |p| Vec3::new(-p.x, p.y, -p.z),
-        |p| Vec3::new(-p.z, p.y, p.x),
+    let turns: [fn(DVec3) -> DVec3; 3] = [
+        |p| DVec3::new(p.z, p.y, -p.x),
+        |p| DVec3::new(-p.x, p.y, -p.z),
+        |p| DVec3::new(-p.z, p.y, p.x),
     ];
     for map in turns {
-        // The cell [x, x+1] x [z, z+1] goes to [z, z+1] x [-x-1, -x].
+        // A quarter turn takes the cell [x, x+1] x [z, z+1] to [z, z+1] x [-x-1, -x].
         for cell in &mut cells {
             *cell = [cell[1], -cell[0] - 1];
         }
@@ -133,7 +105,7 @@ fn quarter_turns_of_the_level_turn_its_light() {
         for (block, original) in level.blocks.iter_mut().zip(&painted(&CELLS).blocks) {
             block.albedo = original.albedo;
         }
-        let lights = two_lights().map(|light| moved(light, |p| map(p.as_vec3()).as_dvec3(), 1.0));
+        let lights = two_lights().map(|light| moved(light, map, 1.0));
         let (other, found) = indirect(&level, &lights, TEN);
         let found = matched(&scene, &other, &found, map);
         let apart = largest_difference(&found, &expected);
@@ -142,7 +114,7 @@ fn quarter_turns_of_the_level_turn_its_light() {
     }
 }
 
-/// The light at another place, in a world `scale` times larger with the same irradiance.
+/// The light at another place, in a world that is `scale` times larger and has the same irradiance.
 fn moved(light: Light, map: impl Fn(DVec3) -> DVec3, scale: f32) -> Light {
     let Light::Sphere {
         position,
@@ -152,7 +124,7 @@ fn moved(light: Light, map: impl Fn(DVec3) -> DVec3, scale: f32) -> Light {
     else {
         panic!("only sphere lights are moved");
     };
-    sphere(
+    Light::sphere(
         map(position.as_dvec3()).as_vec3(),
         radius * scale,
         intensity * scale * scale,
@@ -173,17 +145,18 @@ fn rigid_motion_and_uniform_scale_change_nothing() {
         let lights = two_lights().map(|light| moved(light, map, scale as f32));
         let (_, found) = indirect(&other, &lights, TEN);
         let apart = largest_difference(&found, &expected);
-        // Positions are `f32`: 1e-7 of the level's size, over the 0.3 widths to the nearest wall.
+        // Positions in `f32` are exact to 1e-7 of the level's size, and 0.3 widths from the nearest wall.
         assert!(apart < 2.0 * ROUNDING, "scale {scale}: {apart}");
     }
 }
 
-/// The level with one block turned by `rotation` less, and its corners, colours and doors named anew.
+/// The same level, with the corners, colours and openings of one block named anew: its orientation is turned back by
+/// `rotation`.
 fn with_permuted_corners(level: &Level, index: usize, rotation: CubeRotation) -> Level {
     let mut out = level.clone();
     let block = &mut out.blocks[index];
     let original = &level.blocks[index];
-    // Points of the new turned cube, taken to the old one's by `rotation`.
+    // `rotation` takes points of the new turned cube to those of the old one.
     block.warp = Hexahedron {
         corners: std::array::from_fn(|k| {
             let there = rotation.point(Hexahedron::unit_corner(k));
@@ -213,7 +186,7 @@ fn with_permuted_corners(level: &Level, index: usize, rotation: CubeRotation) ->
 }
 
 #[test]
-fn an_orientation_is_a_permutation_of_corners() {
+fn an_orientation_acts_like_a_permutation_of_corners() {
     let mut level = painted(&CELLS);
     let mut random = Random(3);
     for albedo in level.blocks.iter_mut().flat_map(|b| &mut b.albedo) {
@@ -241,7 +214,7 @@ fn light_is_linear_in_intensity() {
                 position,
                 radius,
                 intensity,
-            } => sphere(position, radius, intensity * factor),
+            } => Light::sphere(position, radius, intensity * factor),
             other => other,
         });
         let (_, found) = indirect(&level, &lights, TEN);
@@ -255,11 +228,11 @@ fn light_is_linear_in_intensity() {
 }
 
 #[test]
-fn a_block_may_stand_on_its_head() {
+fn a_block_may_be_upside_down() {
     let mut level = painted(&[[0, 0], [1, 0], [2, 0]]);
     let (scene, expected) = indirect(&level, &two_lights()[..1], TEN);
     let upright = level.blocks[1].orientation;
-    // A half turn about the corridor's axis leaves a straight block's openings where they are.
+    // A half turn about the corridor's axis keeps the openings of a straight block in place.
     let along = upright.face(Face::PosX);
     let up = upright.face(Face::PosY);
     level.blocks[1].orientation =
@@ -267,7 +240,7 @@ fn a_block_may_stand_on_its_head() {
     let (other, found) = indirect(&level, &two_lights()[..1], TEN);
     let found = matched(&scene, &other, &found, |p| p);
     let apart = largest_difference(&found, &expected);
-    println!("on its head: {apart:.2e}");
+    println!("upside down: {apart:.2e}");
     assert!(apart < ROUNDING, "{apart}");
 }
 
@@ -285,8 +258,8 @@ fn lights_add_up() {
         .collect();
     let apart = largest_difference(&together, &sum);
     println!("superposition: {apart:.2e}");
-    // Negative light is cut off a pass at a time, so where one light alone leaves some, sums differ; these
-    // lights are far enough from walls.
+    // Negative light is set to 0 once a pass. If one light alone left some, sums would differ. These lights are far enough
+    // from walls.
     assert!(apart < 1e-4, "{apart}");
 }
 
@@ -303,7 +276,7 @@ fn channels_do_not_mix() {
             } => {
                 let mut single = Vec3::ZERO;
                 single[channel] = intensity[channel];
-                sphere(position, radius, single)
+                Light::sphere(position, radius, single)
             }
             other => other,
         });
@@ -320,23 +293,10 @@ fn channels_do_not_mix() {
 #[test]
 fn a_mirrored_corridor_has_mirrored_light() {
     let level = floor_plan(&corridor(6), 0.8);
-    let at = |x: f32| [sphere(Vec3::new(x, 0.3, 0.6), 0.1, Vec3::ONE)];
+    let at = |x: f32| [Light::sphere(Vec3::new(x, 0.3, 0.6), 0.1, Vec3::ONE)];
     let (scene, left) = indirect(&level, &at(1.25), CONVERGED);
     let (other, right) = indirect(&level, &at(4.75), CONVERGED);
-    let by_place = |scene: &Scene, texel: usize, mirror: bool| {
-        let (mut p, mut n) = (position_of(&scene, texel), normal_of(&scene, texel));
-        if mirror {
-            (p.x, n.x) = (6.0 - p.x, -n.x);
-        }
-        let whole = |v: Vec3| v.round().as_ivec3().to_array();
-        (whole(p * 64.0), whole(n))
-    };
-    let index: HashMap<_, usize> = (0..other.texel_count())
-        .map(|texel| (by_place(&other, texel, false), texel))
-        .collect();
-    let mirrored: Vec<[f32; 3]> = (0..scene.texel_count())
-        .map(|texel| right[index[&by_place(&scene, texel, true)]])
-        .collect();
+    let mirrored = matched(&scene, &other, &right, |p| DVec3::new(6.0 - p.x, p.y, p.z));
     let apart = largest_difference(&mirrored, &left);
     println!("mirrored corridor: {apart:.2e}");
     assert!(apart < GRID, "{apart}");

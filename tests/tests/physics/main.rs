@@ -1,4 +1,4 @@
-//! Physics that holds whatever the level: closed forms, energy, reciprocity, full rank equals dense.
+//! Physics that holds in every level: closed forms, energy, reciprocity, and full rank equals the dense operator.
 
 mod convergence;
 mod emission;

@@ -1,15 +1,16 @@
-//! The path tracer against closed forms and against the exact solver.
+//! The path tracer agrees with closed forms and with the exact solver.
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_core::geometry::mesh::{Material, TriangleMesh};
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::geometry::mesh::TriangleMesh;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::path_tracer::{PathScene, PathSettings, SphereLight, irradiance};
 use mrt_core::reference::radiosity::ExactScene;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
+use mrt_tests::{painted, with_threads};
 
 fn unit_cube(albedo: f32) -> TriangleMesh {
     let positions = (0..8)
@@ -27,12 +28,7 @@ fn unit_cube(albedo: f32) -> TriangleMesh {
         .iter()
         .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
         .collect();
-    let mut mesh = TriangleMesh::from_triangles(positions, triangles);
-    mesh.materials = vec![Material {
-        name: "paint".into(),
-        albedo: Vec3::splat(albedo),
-    }];
-    mesh
+    painted(TriangleMesh::from_triangles(positions, triangles), albedo)
 }
 
 #[test]
@@ -67,20 +63,20 @@ fn a_cube_agrees_with_the_exact_solver_within_its_noise() {
         let green: Vec<f64> = traced.iter().map(|e| e.indirect.y / 2.0).collect();
         let blue: Vec<f64> = traced.iter().map(|e| e.indirect.z * 2.0).collect();
         assert!(rel_l2(&green, &blue) < 1e-12);
-        let bounces = Bounces::Count(bounces as usize);
+        let bounces = ReferenceBounces::Count(bounces as usize);
         let exact = solve(&scene, &transport, &quarters, bounces, &albedo).unwrap();
-        // The radiosity that one path meets deviates from its mean by less than the mean itself
-        // here (the spot nearest to the light has 2.6 times the mean), so the error of N
-        // independent paths is below 1/sqrt(N), 3.1 %; the exact side adds 0.5 % at 8².
+        // The radiosity that a path meets deviates from its mean by less than the mean: the spot nearest to the light has
+        // 2.6 times the mean. So the error of N independent paths is below 1/sqrt(N), 3.1 %. The exact solver adds 0.5 % at
+        // 8² texels.
         let bound = 1.0 / f64::from(PATHS).sqrt() + 0.005;
         let error = rel_l2(&green, &exact);
         assert!(error < bound, "{bounces:?}: {error}");
-        // Noise has no preferred sign: the mean over 384 texels is 20 times closer.
+        // Noise has no preferred sign, so the mean over 384 texels is 20 times as exact.
         let (mean, exact_mean) = (green.iter().sum::<f64>(), exact.iter().sum::<f64>());
         assert!((mean / exact_mean - 1.0).abs() < bound / 5.0);
 
         let traced_direct: Vec<f64> = traced.iter().map(|e| e.direct.x).collect();
-        // Differs by rounding to f32 only.
+        // Only rounding to `f32` differs.
         assert!(rel_l2(&traced_direct, &direct(&scene, &light)) < 1e-5);
     }
 }
@@ -98,7 +94,7 @@ fn a_white_furnace_adds_up_the_geometric_series() {
         };
         let found = irradiance(&scene, &[center], &settings)[0];
         let albedo = f64::from(albedo);
-        // All paths carry the same light, so there is no noise; what 60 bounces leave out is a^61.
+        // All paths carry the same light, so there is no noise. 60 bounces leave out a share of albedo^61.
         assert!((found.direct.x - 1.0).abs() < 1e-12, "{found:?}");
         let total = found.direct.x + found.indirect.x;
         assert!((total - 1.0 / (1.0 - albedo)).abs() < 1e-6, "{total}");
@@ -119,21 +115,15 @@ fn the_number_of_threads_changes_no_bit() {
         bounces: 2,
         seed: 3,
     };
-    let with_threads = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| irradiance(&scene, &receivers, &settings))
-    };
-    let one = with_threads(1);
-    assert_eq!(one, with_threads(3));
-    // Each point has paths of its own, equal points too.
+    let on = |threads| with_threads(threads, || irradiance(&scene, &receivers, &settings));
+    let one = on(1);
+    assert_eq!(one, on(3));
+    // Each receiver has paths of its own, even if two are at the same point.
     assert_ne!(one[0], one[1]);
 }
 
 #[test]
-fn an_emission_for_each_material_is_required() {
+fn the_number_of_emissions_must_be_that_of_materials_or_0() {
     let wrong = PathScene::new(&unit_cube(0.5), Vec::new(), &[DVec3::ONE; 2]);
     assert!(wrong.is_err_and(|error| error.to_string().contains("expected none, or 1")));
 }

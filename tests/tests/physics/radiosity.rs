@@ -1,18 +1,19 @@
-//! The exact solver against closed forms and conservation laws.
+//! The exact solver agrees with closed forms and conservation laws.
 
 use std::f64::consts::PI;
 
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::Hexahedron;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::rel_l2;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_mean, direct_quarters};
 use mrt_core::reference::radiosity::solve::solve;
 use mrt_core::reference::radiosity::transport::Transport;
 use mrt_core::reference::radiosity::{ExactError, ExactScene, Side};
+use mrt_tests::with_threads;
 
-/// Form factors are stored as `f32`; a row of a thousand adds up to within this of 1.
+/// Form factors are stored in `f32`. The sum of a row of a thousand differs from 1 by less than this.
 const ROW_SUM_TOLERANCE: f64 = 1e-6;
 
 const L_SHAPE: [[i32; 3]; 4] = [[0, 0, 0], [1, 0, 0], [1, 0, 1], [1, 1, 1]];
@@ -37,7 +38,7 @@ fn mapped(cells: &[[i32; 3]], map: impl Fn(DVec3) -> DVec3) -> Vec<Hexahedron> {
     cells.iter().map(block).collect()
 }
 
-/// Takes lines to lines and planes to planes, but no cube to a parallelepiped.
+/// A perspective map: lines stay lines and planes stay planes, but a cube does not become a parallelepiped.
 fn perspective(p: DVec3) -> DVec3 {
     DVec3::new(p.x + 0.2 * p.y, 1.3 * p.y, 0.9 * p.z) / (1.0 + 0.1 * p.x + 0.07 * p.z)
 }
@@ -69,7 +70,8 @@ fn closed_levels() -> Vec<(&'static str, ExactScene)> {
     ]
 }
 
-/// Area-weighted factor from all texels of one wall to all of another.
+/// Form factor between two walls: the mean over the texels of one, weighted by area, of the sum over the texels of the
+/// other.
 fn wall_factor(scene: &ExactScene, transport: &Transport, from: usize, to: usize) -> f64 {
     let texels = scene.resolution() * scene.resolution();
     let range = |wall: usize| wall * texels..(wall + 1) * texels;
@@ -94,7 +96,7 @@ fn unit_squares_have_the_closed_form_factors() {
     let perpendicular = 1.0 / PI
         * (2.0 * 1f64.atan() - 2f64.sqrt() * (1.0 / 2f64.sqrt()).atan()
             + 0.25 * (3.0f64 / 4.0).ln());
-    // The midpoint rule over 24² receivers; the perpendicular factor jumps at the shared edge.
+    // Errors are those of the midpoint rule over 24² receivers. The perpendicular factor jumps at the shared edge.
     assert!((wall_factor(&scene, &transport, 0, 1) - parallel).abs() < 1e-4);
     assert!((wall_factor(&scene, &transport, 0, 2) - perpendicular).abs() < 1e-3);
     // The closed forms themselves fill the hemisphere.
@@ -115,12 +117,12 @@ fn a_square_seen_through_two_openings_has_the_closed_form_factor() {
             + 2.0 * x * root * (x / root).atan()
             - 2.0 * x * x.atan());
     let found = wall_factor(&scene, &transport, 0, end);
-    // The midpoint rule over smooth integrands.
+    // The error is that of the midpoint rule over a smooth integrand.
     assert!((found - expected).abs() < 1e-4 * expected, "{found}");
 }
 
 #[test]
-fn rows_add_up_to_one_in_closed_levels() {
+fn form_factors_of_a_texel_add_up_to_one_in_closed_levels() {
     for (name, scene) in closed_levels() {
         let transport = Transport::build(&scene);
         let sums = transport
@@ -153,15 +155,15 @@ fn a_mild_warp_without_planar_faces_still_covers_the_hemisphere() {
         .irradiance(&vec![[1.0; 4]; scene.texel_count()])
         .unwrap();
     let worst = sums.iter().fold(0.0, |w: f64, s| w.max((s - 1.0).abs()));
-    // A twist by 0.1 rad bends faces by 0.025: what a face hides of itself near its edges, and what
-    // the own texel would send to itself, is of that order for single texels, far less on average.
+    // A twist by 0.1 rad bends faces by 0.025. The solver neglects that a bent face hides parts of itself and sends light to
+    // itself. For single texels this is an error of that order, and on average far less.
     assert!(worst < 0.03, "{worst}");
     let mean = sums.iter().sum::<f64>() / sums.len() as f64;
     assert!((mean - 1.0).abs() < 3e-3, "{mean}");
 }
 
 #[test]
-fn a_furnace_glows_by_the_geometric_series() {
+fn a_furnace_glows_as_the_geometric_series_says() {
     const EMISSION: f64 = 2.0;
     for (name, scene) in closed_levels() {
         let transport = Transport::build(&scene);
@@ -169,7 +171,8 @@ fn a_furnace_glows_by_the_geometric_series() {
             // Direct light of e / a makes the first reflection emit e.
             let direct = vec![[EMISSION / albedo; 4]; scene.texel_count()];
             let albedos = vec![albedo; scene.texel_count()];
-            let irradiance = solve(&scene, &transport, &direct, Bounces::All, &albedos).unwrap();
+            let irradiance =
+                solve(&scene, &transport, &direct, ReferenceBounces::All, &albedos).unwrap();
             for e in irradiance {
                 let radiosity = EMISSION + albedo * e;
                 let expected = EMISSION / (1.0 - albedo);
@@ -192,7 +195,7 @@ fn exchange_between_walls_is_reciprocal() {
             for b in 0..a {
                 let there = area(a) * wall_factor(&scene, &transport, a, b);
                 let back = area(b) * wall_factor(&scene, &transport, b, a);
-                // The midpoint rule over 6² receivers, worst for a wall that meets another at an edge.
+                // The error of the midpoint rule over 6² receivers, which is largest for walls that share an edge.
                 let tolerance = 0.02 * area(a).min(area(b));
                 assert!((there - back).abs() < tolerance, "{name}: {there} {back}");
             }
@@ -208,13 +211,13 @@ fn single_texels_that_are_far_apart_are_reciprocal() {
     assert_eq!(scene.walls()[5].face, Face::PosX);
     for (a, b) in [(0, end), (17, end + 200), (255, end + 3), (130, end + 90)] {
         let (there, back) = (transport.factor(a, b), transport.factor(b, a));
-        // Receivers are points: second order in texel size over distance, (1/32)² here.
+        // Receivers are points. The error is of second order in texel size over distance, (1/32)² here.
         assert!((there / back - 1.0).abs() < 1e-3, "{there} {back}");
     }
 }
 
 #[test]
-fn energy_never_grows() {
+fn the_largest_radiosity_never_grows() {
     let scene = ExactScene::from_cells(&L_SHAPE, 6).unwrap();
     let transport = Transport::build(&scene);
     let mut radiosity: Vec<f64> = (0..scene.texel_count())
@@ -240,19 +243,26 @@ fn light_is_lost_through_the_sky() {
     let ones = vec![[1.0; 4]; scene.texel_count()];
     let sums = transport.irradiance(&ones).unwrap();
     assert!(sums.iter().all(|&sum| sum < 1.0 + ROW_SUM_TOLERANCE));
-    // Opposite to the sky, seen through one opening: 1 minus a parallel square at distance 2.
+    // This texel sees the sky through one opening: a parallel square at distance 2.
     let below = scene.walls().iter().find(|wall| wall.block == 2).unwrap();
     assert!(sums[below.first_texel + 15] < 0.99);
 }
 
 #[test]
-fn an_unconnected_block_reads_exactly_zero() {
+fn light_in_an_unconnected_block_is_exactly_zero() {
     let scene = ExactScene::from_cells(&[[0, 0, 0], [1, 0, 0], [3, 0, 0], [2, 1, 0]], 8).unwrap();
     let light = PointLight::unit(DVec3::new(0.6, 0.5, 0.4));
     let transport = Transport::build(&scene);
     let quarters = direct_quarters(&scene, &light, 2);
     let albedo = vec![0.9; scene.texel_count()];
-    let indirect = solve(&scene, &transport, &quarters, Bounces::All, &albedo).unwrap();
+    let indirect = solve(
+        &scene,
+        &transport,
+        &quarters,
+        ReferenceBounces::All,
+        &albedo,
+    )
+    .unwrap();
     let straight = direct(&scene, &light);
     for wall in scene.walls() {
         for texel in wall.first_texel..wall.first_texel + 64 {
@@ -267,7 +277,7 @@ fn an_unconnected_block_reads_exactly_zero() {
 
 #[test]
 fn direct_light_of_a_closed_level_is_all_its_power() {
-    // Flux of an isotropic point: 4 pi I. The midpoint rule over 16 x 8 points a side.
+    // The flux of an isotropic point light is 4 pi I. The tolerance is for the midpoint rule over 16 x 8 points along a side.
     for scene in [
         ExactScene::from_cells(&L_SHAPE, 16).unwrap(),
         ExactScene::new(mapped(&L_SHAPE, perspective), sides_of(&L_SHAPE), 16).unwrap(),
@@ -287,34 +297,40 @@ fn all_bounces_are_the_limit_of_many() {
     let quarters = direct_quarters(&scene, &light, 4);
     let albedo = vec![0.8; scene.texel_count()];
     let run = |bounces| solve(&scene, &transport, &quarters, bounces, &albedo).unwrap();
-    let all = run(Bounces::All);
-    // What 80 bounces leave out: 0.8^80 = 2e-8; the limit is solved to 1e-7 of the first bounce.
-    assert!(rel_l2(&run(Bounces::Count(80)), &all) < 1e-6);
-    assert_eq!(run(Bounces::Count(1)), run(Bounces::First));
-    assert!(run(Bounces::Count(0)).iter().all(|&e| e == 0.0));
+    let all = run(ReferenceBounces::All);
+    // 80 bounces leave out a share of 0.8^80 = 2e-8, and the limit is solved to 1e-7 of the first bounce.
+    assert!(rel_l2(&run(ReferenceBounces::Count(80)), &all) < 1e-6);
+    assert_eq!(
+        run(ReferenceBounces::Count(1)),
+        run(ReferenceBounces::First)
+    );
+    assert!(run(ReferenceBounces::Count(0)).iter().all(|&e| e == 0.0));
 }
 
 #[test]
 fn the_number_of_threads_changes_no_bit() {
     let solved_with = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        pool.install(|| {
+        with_threads(threads, || {
             let scene = ExactScene::from_cells(&L_SHAPE, 6).unwrap();
             let light = PointLight::unit(DVec3::new(0.3, 0.4, 0.6));
             let quarters = direct_quarters(&scene, &light, 3);
             let transport = Transport::build(&scene);
             let albedo = vec![0.7; scene.texel_count()];
-            solve(&scene, &transport, &quarters, Bounces::All, &albedo).unwrap()
+            solve(
+                &scene,
+                &transport,
+                &quarters,
+                ReferenceBounces::All,
+                &albedo,
+            )
+            .unwrap()
         })
     };
     assert_eq!(solved_with(1), solved_with(3));
 }
 
 #[test]
-fn inputs_that_make_no_sense_are_refused() {
+fn faulty_inputs_are_refused_by_a_named_error() {
     let cell = Hexahedron::cell(DVec3::ZERO);
     let beyond = Hexahedron::cell(DVec3::new(1.5, 0.0, 0.0));
     let walls = [Side::Wall; 6];
@@ -345,14 +361,21 @@ fn inputs_that_make_no_sense_are_refused() {
     let transport = Transport::build(&scene);
     let light = vec![[1.0; 4]; 24];
     for (albedo, bounces) in [
-        (1.0, Bounces::All),
-        (1.1, Bounces::First),
-        (f64::NAN, Bounces::First),
-        (-0.1, Bounces::All),
+        (1.0, ReferenceBounces::All),
+        (1.1, ReferenceBounces::First),
+        (f64::NAN, ReferenceBounces::First),
+        (-0.1, ReferenceBounces::All),
     ] {
         let error = solve(&scene, &transport, &light, bounces, &[albedo; 24]).unwrap_err();
         assert!(matches!(error, ExactError::Albedo { .. }), "{error}");
     }
-    let error = solve(&scene, &transport, &light, Bounces::All, &[0.5; 23]).unwrap_err();
+    let error = solve(
+        &scene,
+        &transport,
+        &light,
+        ReferenceBounces::All,
+        &[0.5; 23],
+    )
+    .unwrap_err();
     assert!(matches!(error, ExactError::Length { found: 23, .. }));
 }

@@ -1,4 +1,4 @@
-//! Errors against files that another renderer computed.
+//! Errors against reference files, which another renderer computed.
 
 mod dictionary_accuracy;
 mod radiosity_vs_oracle;

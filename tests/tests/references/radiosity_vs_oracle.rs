@@ -1,53 +1,51 @@
-//! The exact solver against files that another renderer computed.
+//! The exact solver against reference files.
 //!
-//! The files are Monte Carlo estimates. Their first bounce is nearly free of noise; later bounces
-//! scatter by about 1 % from texel to texel, independently: means over 2² and 4² texels of the
-//! difference to the exact solution are 2 and 4 times smaller, and solving the cube at three times
-//! the resolution leaves the difference as it is. So later bounces are compared as means over 4 x 4
-//! texels, a quarter of the noise, where an error of the solver would stay as large as it is.
+//! The files are Monte Carlo estimates. Their first bounce has hardly any noise. Later bounces scatter from texel to texel by
+//! about 1 %, independently: means of the difference from the exact solution over 2² and 4² texels are 2 and 4 times smaller,
+//! and the difference in the cube stays the same when it is solved at three times the resolution. So later bounces are
+//! compared as means over 4 x 4 texels. These have a quarter of the noise, and any error of the solver in full.
 
 use glam::DVec3;
-use mrt_core::reference::bounces::Bounces;
+use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{rel_l2, rel_l2_by_hop};
-use mrt_core::reference::oracle_file::{
-    Kind, RGB_BOUNCES, ReferenceFile, oracle_folder_or_report, read,
-};
+use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
 use mrt_core::reference::radiosity::ExactScene;
 use mrt_core::reference::radiosity::direct::{PointLight, direct, direct_quarters};
 use mrt_core::reference::radiosity::solve::{solve, solve_rgb};
 use mrt_core::reference::radiosity::transport::Transport;
+use mrt_tests::reference;
 
-/// Whole level, mean over lights: found 0.12 to 0.26 %, of it 0.1 the file's noise.
+/// Bound for a whole level, mean over lights. Measured: 0.12 to 0.26 %, with 0.1 % noise of the file.
 const FIRST_BOUNCE_LIMIT: f64 = 0.003;
-/// Means over 4 x 4 texels, mean over lights: found 0.15 to 0.39 %, of it 0.1 to 0.3 noise.
+/// Bound for means over 4 x 4 texels, mean over lights. Measured: 0.15 to 0.39 %, with 0.1 to 0.3 % noise.
 const LATER_BOUNCES_LIMIT: f64 = 0.0045;
-/// The same, single texels, which is the files' noise: found 0.4 to 1.6 %.
+/// Bound for single texels, mean over lights: the noise of the files. Measured: 0.4 to 1.6 %.
 const NOISE_LIMIT: f64 = 0.018;
-/// Single precision.
+/// Bound for direct light: single precision.
 const DIRECT_LIMIT: f64 = 2e-6;
-/// Samples along a quarter of a texel for the sources of the first bounce.
+/// Samples along a quarter of a texel for the direct light that the first bounce reflects.
 const SAMPLES: usize = 4;
 
+/// A reference file and the exact solver's scene of its level.
 struct Level {
     file: ReferenceFile,
     scene: ExactScene,
     transport: Transport,
 }
 
-fn load(name: &str) -> Option<Level> {
-    let folder = oracle_folder_or_report(&format!("exact_vs_oracle on {name}"))?;
-    let file = read(&folder.join(format!("{name}.json"))).unwrap();
+fn load(name: &str) -> Level {
+    let file = reference(name);
     let scene = ExactScene::from_cells(&file.cells, file.resolution.unwrap()).unwrap();
     let walls: Vec<_> = scene.walls().iter().map(|w| (w.block, w.face)).collect();
     assert_eq!(walls, file.walls, "texel order");
     let transport = Transport::build(&scene);
-    // The largest must leave room for several at once.
+    // Several tests run at once, so even the largest level must leave room for others.
     assert!(transport.bytes() < 300_000_000);
-    Some(Level {
+    Level {
         file,
         scene,
         transport,
-    })
+    }
 }
 
 /// Sums over 4 x 4 texels of walls of `resolution`² values.
@@ -62,7 +60,7 @@ fn pooled(values: &[f64], resolution: usize) -> Vec<f64> {
     sums
 }
 
-/// Prints the errors of one solution and returns them for (texels, 4 x 4 texels).
+/// Errors of one solution for single texels and for means over 4 x 4 texels. Prints them.
 fn errors(level: &Level, light: usize, term: &str, found: &[f64], reference: &[f64]) -> [f64; 2] {
     let resolution = level.scene.resolution();
     let hops = level.file.hops(light).unwrap();
@@ -84,8 +82,8 @@ fn mean(errors: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / errors.len() as f64)
 }
 
-/// Texels that a tiny move of the light neither hides nor uncovers. Where the ray to the light
-/// touches an edge, lit and unlit are both right.
+/// True for texels that a tiny move of the light neither hides nor uncovers. Of other texels, whose ray to the light touches
+/// an edge, both lit and unlit is right.
 fn is_stable(scene: &ExactScene, light: &PointLight) -> Vec<bool> {
     let lit = |offset: DVec3| {
         let position = light.position + offset;
@@ -104,19 +102,13 @@ fn is_stable(scene: &ExactScene, light: &PointLight) -> Vec<bool> {
 }
 
 fn check_colourless(name: &str) {
-    let Some(level) = load(name) else {
-        return;
-    };
-    let Level {
-        file,
-        scene,
-        transport,
-    } = &level;
+    let level = load(name);
+    let (file, scene, transport) = (&level.file, &level.scene, &level.transport);
     let terms = [
-        ("first bounce", Bounces::First, 1.0),
-        ("6 bounces, albedo 0.9", Bounces::Count(6), 0.9),
-        ("all, albedo 0.5", Bounces::All, 0.5),
-        ("all, albedo 0.9", Bounces::All, 0.9),
+        ("first bounce", ReferenceBounces::First, 1.0),
+        ("6 bounces, albedo 0.9", ReferenceBounces::Count(6), 0.9),
+        ("all, albedo 0.5", ReferenceBounces::All, 0.5),
+        ("all, albedo 0.9", ReferenceBounces::All, 0.9),
     ];
     let mut found = terms.map(|_| Vec::new());
     for (light, &position) in file.lights.iter().enumerate() {
@@ -130,7 +122,7 @@ fn check_colourless(name: &str) {
             kept.map(|(value, _)| value).collect()
         };
         let straight = keep(direct(scene, &source));
-        // At most the texels along a shadow's edge that runs through texel centres.
+        // An edge of a shadow that runs through centres of texels excludes at most 128 texels.
         assert!(straight.len() + 128 > scene.texel_count());
         let error = rel_l2(&straight, &keep(file.term(light, 0).unwrap()));
         assert!(error < DIRECT_LIMIT, "{name}, light {light}: {error}");
@@ -149,10 +141,9 @@ fn check_colourless(name: &str) {
         assert!(errors[0] < NOISE_LIMIT, "{name}: {errors:?}");
         assert!(errors[1] < LATER_BOUNCES_LIMIT, "{name}: {errors:?}");
     }
-    // At albedo 0.9 half of the reference is continued from six bounces (see
-    // `ReferenceFile::indirect_irradiance`). Continued in the same way, the solver's own six bounces
-    // miss its own limit by 0.01 to 0.1 % in the cube and the room, but by up to 2 % where the level
-    // is long, and by 5 % in the maze.
+    // At albedo 0.9, half of the reference is extrapolated from six bounces (see `ReferenceFile::indirect_irradiance`).
+    // Extrapolating the solver's own six bounces in this way differs from all of its bounces by 0.01 to 0.1 % in the cube and
+    // in the room, by up to 2 % in long levels, and by 5 % in the maze.
     let nine_limit = match name {
         "cube" | "room3x3" => LATER_BOUNCES_LIMIT,
         "maze11" => 0.06,
@@ -162,21 +153,18 @@ fn check_colourless(name: &str) {
 }
 
 fn check_coloured(name: &str) {
-    let Some(level) = load(name) else {
-        return;
-    };
     let Level {
         file,
         scene,
         transport,
-    } = &level;
+    } = &load(name);
     let Kind::IrradianceRgb { albedo } = &file.kind else {
         panic!("{name} is not coloured");
     };
     let albedo = scene.spread_over_texels(albedo).unwrap();
     let terms = [
-        ("first bounce", Bounces::First),
-        ("10 bounces", Bounces::Count(RGB_BOUNCES)),
+        ("first bounce", ReferenceBounces::First),
+        ("10 bounces", ReferenceBounces::Count(RGB_BOUNCES)),
     ];
     let mut found = terms.map(|_| Vec::new());
     for (light, &position) in file.lights.iter().enumerate() {
@@ -184,7 +172,7 @@ fn check_coloured(name: &str) {
         for ((label, bounces), errors_of_term) in terms.iter().zip(&mut found) {
             let solved = solve_rgb(scene, transport, &quarters, *bounces, &albedo).unwrap();
             let reference = file.indirect_irradiance_rgb(light, *bounces).unwrap();
-            // Channel by channel, so that walls follow each other as in colourless files.
+            // One channel after another, so that each is a list of walls as in colourless files.
             let channels = |rgb: &[[f64; 3]]| -> Vec<Vec<f64>> {
                 (0..3).map(|c| rgb.iter().map(|e| e[c]).collect()).collect()
             };
@@ -209,9 +197,11 @@ fn check_coloured(name: &str) {
     assert!(ten[1] < LATER_BOUNCES_LIMIT, "{name}: {ten:?}");
 }
 
+/// A test for each reference file, of the same name.
 macro_rules! one_test_a_file {
     ($check:ident: $($name:ident),*) => {$(
         #[test]
+        #[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
         fn $name() {
             $check(stringify!($name));
         }
@@ -222,15 +212,19 @@ one_test_a_file!(check_colourless: cube, corridor5, l_turn, t_junction, room3x3,
 one_test_a_file!(check_coloured: cube_cornell, cube_one_white, corridor5_painted);
 
 #[test]
-fn probe_files_are_read() {
-    let Some(folder) = oracle_folder_or_report("probe_files_are_read") else {
-        return;
-    };
+#[cfg_attr(not(has_oracle), ignore = "needs the folder shared/oracle")]
+fn probe_files_hold_coefficients_and_no_irradiance() {
     for (name, points) in [("cube_probes", 64), ("corridor5_probes", 320)] {
-        let file = read(&folder.join(format!("{name}.json"))).unwrap();
+        let file = reference(name);
         assert_eq!(file.shape[2..], [points, 9]);
         assert_eq!(file.term(1, 0).unwrap().len(), points * 9);
-        assert!(file.indirect_irradiance(0, Bounces::First, 1.0).is_err());
-        assert!(file.indirect_irradiance_rgb(0, Bounces::First).is_err());
+        assert!(
+            file.indirect_irradiance(0, ReferenceBounces::First, 1.0)
+                .is_err()
+        );
+        assert!(
+            file.indirect_irradiance_rgb(0, ReferenceBounces::First)
+                .is_err()
+        );
     }
 }

@@ -1,14 +1,17 @@
 //! Signs of a polynomial of degree four on [0, 1], from its Bernstein coefficients.
 //!
-//! The polynomial is a convex combination of its coefficients, its first and last values are the first and
-//! last coefficient, and it has at most as many zeros as they have changes of sign; cutting the interval in
-//! half (de Casteljau) makes all three sharper. See G. Farin, "Curves and Surfaces for CAGD", chapter 5.
+//! The values of the polynomial are convex combinations of its coefficients. Its first and last values are
+//! the first and the last coefficient. It has at most as many zeros as the coefficients have changes of
+//! sign. Halving the interval (de Casteljau) makes all three statements sharper. See G. Farin, "Curves and
+//! Surfaces for CAGD", chapter 5.
 
-/// Times that the interval is halved in search of a sign. Dips below zero that are shorter than
-/// 2^-16 of it may be missed; between two points of the unit cube they are less than 1e-8 deep.
+/// How many times the interval is halved in search of a sign.
+///
+/// Dips below zero that are shorter than 2^-16 of the interval may be missed. Between two points of the
+/// unit cube they are less than 1e-8 deep.
 const DEPTH: u32 = 16;
 
-/// Steps of the safeguarded Newton iteration; bisection alone would use up the digits in 53.
+/// Most steps of the safeguarded Newton iteration. Bisection alone would take 53 to use up the digits.
 const MAX_STEPS: u32 = 64;
 
 /// A polynomial of degree four.
@@ -21,7 +24,7 @@ pub(super) struct Quartic {
 }
 
 impl Quartic {
-    /// From the coefficients of 1, t, t², t³, t⁴.
+    /// The polynomial with the given coefficients of 1, t, t², t³, t⁴.
     pub(super) fn new(powers: [f64; 5]) -> Self {
         let [a, b, c, d, e] = powers;
         let bernstein = [
@@ -34,8 +37,8 @@ impl Quartic {
         Self { powers, bernstein }
     }
 
-    /// The same with values at 0 and 1 that are negative by rounding made zero; `None` where one is below
-    /// `-tolerance`.
+    /// The same polynomial, but values at 0 and 1 that are negative by at most `tolerance` become zero;
+    /// `None` if one is lower.
     pub(super) fn with_ends_on_the_wall(mut self, tolerance: f64) -> Option<Self> {
         for end in [0, 4] {
             if self.bernstein[end] < -tolerance {
@@ -46,12 +49,12 @@ impl Quartic {
         Some(self)
     }
 
-    /// True where no value on [0, 1] is negative; the first is taken to be none.
+    /// True if no value on [0, 1] is negative. The value at 0 must not be negative.
     pub(super) fn stays_non_negative(&self) -> bool {
         first_crossing(&self.bernstein, DEPTH).is_none()
     }
 
-    /// The first t in [0, 1] where values turn negative; the value at 0 counts as at least zero.
+    /// The first t in [0, 1] where values turn negative. A negative value at 0 counts as zero.
     pub(super) fn first_negative(&self) -> Option<f64> {
         let mut bernstein = self.bernstein;
         bernstein[0] = bernstein[0].max(0.0);
@@ -67,7 +70,7 @@ impl Quartic {
                 low = t;
             }
             let newton = t - value / slope;
-            // Also false where the slope is zero.
+            // Written so that NaN and infinity, from a slope of zero, fail.
             let next = if newton > low && newton < high {
                 newton
             } else {
@@ -82,8 +85,8 @@ impl Quartic {
     }
 }
 
-/// An interval in [0, 1] at whose end values are negative, and on which they turned so once and for the
-/// first time. The first coefficient must not be negative.
+/// An interval of [0, 1] that contains the first change of values from positive to negative and no other,
+/// and at whose end the value is negative. The first coefficient must not be negative.
 fn first_crossing(bernstein: &[f64; 5], depth: u32) -> Option<(f64, f64)> {
     if bernstein.iter().all(|&b| b >= 0.0) {
         return None;
@@ -98,7 +101,8 @@ fn first_crossing(bernstein: &[f64; 5], depth: u32) -> Option<(f64, f64)> {
         return None;
     }
     let (left, right) = halves(bernstein);
-    // The right half starts where the left one ends: not below zero, or the left one had a crossing.
+    // The right half starts where the left one ends. That value is not negative, or the left half would
+    // contain a crossing.
     first_crossing(&left, depth - 1)
         .map(|(a, b)| (0.5 * a, 0.5 * b))
         .or_else(|| first_crossing(&right, depth - 1).map(|(a, b)| (0.5 + 0.5 * a, 0.5 + 0.5 * b)))
@@ -125,16 +129,16 @@ mod tests {
 
     #[test]
     fn a_crossing_is_found_before_a_later_one() {
-        // Zeros at 0.2, 0.5 and 0.8, each simple; negative between the first two and after the last.
+        // Simple zeros at 0.2, 0.5 and 0.8; negative between the first two and after the last.
         let powers = [0.08, -0.66, 1.5, -1.0, 0.0];
         let t = Quartic::new(powers).first_negative().expect("it crosses");
-        // A simple zero of slope 0.18: a few ulp of the coefficients by that.
+        // The slope is 0.18, so the zero errs by a few ulp of the coefficients over 0.18.
         assert!((t - 0.2).abs() < 1e-13, "{t}");
     }
 
     #[test]
-    fn touching_zero_is_not_crossing_it() {
-        // (t - 0.3)²: the double zero splits into nothing but rounding.
+    fn a_polynomial_that_touches_zero_does_not_cross_it() {
+        // (t - 0.3)² has a double zero.
         let touching = Quartic::new([0.09, -0.6, 1.0, 0.0, 0.0]);
         assert!(touching.stays_non_negative());
         let crossing = Quartic::new([0.09 - 1e-6, -0.6, 1.0, 0.0, 0.0]);
@@ -142,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_on_the_wall_are_forgiven_rounding_and_no_more() {
+    fn ends_may_be_negative_by_the_tolerance_but_not_by_more() {
         let falling = Quartic::new([1.0, -1.0 - 1e-9, 0.0, 0.0, 0.0]);
         assert!(
             falling

@@ -1,10 +1,10 @@
-//! Properties of the tubes.
+//! Charts, areas, rays and segments of the tubes.
 
 use super::*;
 use crate::lighting::sampling::{sobol_point, sphere_from_square, square_from_unit};
 use proptest::prelude::*;
 
-/// Points are known to a few ulp, and a distance to the wall loses none.
+/// Points err by a few ulp, and so do distances to the wall.
 const ON_WALL: f64 = 1e-13;
 
 fn form() -> impl Strategy<Value = TubeForm> {
@@ -15,10 +15,38 @@ fn unit() -> impl Strategy<Value = f64> {
     0.0..1.0f64
 }
 
-/// A point inside: one of the wall, moved towards the centre line.
-fn inside_point(form: TubeForm, chart: usize, u: f64, v: f64, depth: f64) -> DVec3 {
-    let at = form.surface(form.charts()[chart], u, v);
-    at.position + at.normal * (depth * TUBE_RADIUS)
+/// A place in a tube: a point of the wall, moved towards the centre line.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    chart: usize,
+    u: f64,
+    v: f64,
+    /// 0 on the wall, 1 on the centre line.
+    depth: f64,
+}
+
+fn place() -> impl Strategy<Value = Place> {
+    (0..4usize, unit(), unit(), unit()).prop_map(|(chart, u, v, depth)| Place {
+        chart,
+        u,
+        v,
+        depth,
+    })
+}
+
+impl Place {
+    fn on_wall(self) -> Self {
+        Self { depth: 0.0, ..self }
+    }
+
+    fn surface(self, form: TubeForm) -> SurfacePoint {
+        form.surface(form.charts()[self.chart], self.u, self.v)
+    }
+
+    fn position(self, form: TubeForm) -> DVec3 {
+        let at = self.surface(form);
+        at.position + at.normal * (self.depth * TUBE_RADIUS)
+    }
 }
 
 proptest! {
@@ -29,10 +57,10 @@ proptest! {
         prop_assert!(form.wall_distance(at.position).abs() < ON_WALL);
         prop_assert!(form.contains(at.position));
         let (found, fu, fv) = form.chart_of(at.position);
-        // At the edge of a chart the neighbour's is as good.
+        // At the edge of a chart the neighbouring chart is as good.
         if (0.001..0.999).contains(&v) {
             prop_assert_eq!(found, face);
-            // Angles about the edge at radius 0.1 lose a digit.
+            // Angles about the bend's edge lose a digit at a radius of 0.1.
             prop_assert!((fu - u).abs() < 1e-13 && (fv - v).abs() < 1e-13);
         }
     }
@@ -47,7 +75,7 @@ proptest! {
         let position = |u, v| form.surface(face, u, v).position;
         let du = (position(u + STEP, v) - position(u - STEP, v)) / (2.0 * STEP);
         let dv = (position(u, v + STEP) - position(u, v - STEP)) / (2.0 * STEP);
-        // Differences of second order: STEP² times the third derivative, and rounding by STEP.
+        // Central differences err by STEP² times the third derivative, and by rounding over STEP.
         let bound = 1e-8;
         prop_assert!((du.normalize() - at.tangents[0]).length() < bound);
         prop_assert!((dv.normalize() - at.tangents[1]).length() < bound);
@@ -56,21 +84,19 @@ proptest! {
         prop_assert!(at.normal.dot(at.tangents[1]).abs() < 1e-14);
         prop_assert!((at.normal.length() - 1.0).abs() < 1e-14);
         prop_assert!(form.wall_distance(at.position + at.normal * 0.1) > 0.0);
-        // u and v grow with the flat face's coordinates.
+        // u and v grow with the coordinates of the flat face.
         prop_assert!(at.tangents[0][face.u_axis()] > 0.0);
         prop_assert!(at.tangents[1][face.v_axis()] > 0.0);
     }
 
     #[test]
     fn rays_end_on_the_wall_or_in_an_opening(
-        form in form(), chart in 0..4usize, u in unit(), v in unit(), depth in 0.0..1.0f64,
-        on_wall in any::<bool>(), x in unit(), y in unit(),
+        form in form(), place in place(), on_wall in any::<bool>(), (x, y) in (unit(), unit()),
     ) {
-        let depth = if on_wall { 0.0 } else { depth };
-        let at = form.surface(form.charts()[chart], u, v);
-        let origin = at.position + at.normal * (depth * TUBE_RADIUS);
+        let place = if on_wall { place.on_wall() } else { place };
+        let origin = place.position(form);
         let mut direction = sphere_from_square(square_from_unit(DVec2::new(x, y)));
-        if direction.dot(at.normal) < 0.0 && on_wall {
+        if direction.dot(place.surface(form).normal) < 0.0 && on_wall {
             direction = -direction;
         }
         let hit = form.first_hit(origin, direction);
@@ -83,7 +109,7 @@ proptest! {
             }
         }
         prop_assert!(form.contains(hit.point));
-        // All of the way there is inside.
+        // The whole way to the end is inside.
         for k in 1..16 {
             let t = hit.distance * f64::from(k) / 16.0;
             prop_assert!(form.wall_distance(origin + direction * t) > -1e-9);
@@ -93,15 +119,15 @@ proptest! {
 
     #[test]
     fn segments_agree_with_rays(
-        form in form(), a in (0..4usize, unit(), unit(), 0.0..1.0f64),
-        b in (0..4usize, unit(), unit(), 0.0..1.0f64), on_wall in any::<bool>(),
+        form in form(), a in place(), b in place(), on_wall in any::<bool>(),
     ) {
-        let depth = |d: f64| if on_wall { 0.0 } else { d };
-        let from = inside_point(form, a.0, a.1, a.2, depth(a.3));
-        let to = inside_point(form, b.0, b.1, b.2, depth(b.3));
+        let [from, to] = [a, b].map(|place| {
+            let place = if on_wall { place.on_wall() } else { place };
+            place.position(form)
+        });
         let reached = form.first_hit(from, to - from).distance;
-        // Within a billionth of the end the ray and the segment may disagree on rounding, and so may they
-        // everywhere on chords that hardly leave the wall.
+        // The ray and the segment may round differently within a billionth of the end, and everywhere on
+        // chords that hardly leave the wall.
         let clear = (reached - 1.0).abs() > 1e-9 || on_wall;
         if clear && form.wall_distance(from.midpoint(to)).abs() > 1e-6 {
             let free = reached > 1.0 - 1e-9;
@@ -112,15 +138,15 @@ proptest! {
 
     #[test]
     fn segments_agree_with_steps_along_them(
-        a in (0..4usize, unit(), unit()), b in (0..4usize, unit(), unit(), 0.01..1.0f64),
+        a in place(), b in place(),
     ) {
         let form = TubeForm::Bend;
-        let from = inside_point(form, a.0, a.1, a.2, 0.0);
-        let to = inside_point(form, b.0, b.1, b.2, b.3);
+        let from = a.on_wall().position(form);
+        let to = Place { depth: 0.01 + 0.99 * b.depth, ..b }.position(form);
         let deepest = (1..2000)
             .map(|k| form.wall_distance(from.lerp(to, f64::from(k) / 2000.0)))
             .fold(f64::INFINITY, f64::min);
-        // Between steps the distance changes by less than the square of half of one, times the curvature.
+        // Between steps the distance changes by less than the square of half a step times the curvature.
         if deepest.abs() > 1e-5 {
             prop_assert_eq!(form.segment_is_free(from, to), deepest > 0.0);
         }
@@ -140,7 +166,7 @@ fn texel_areas_add_up_to_the_wall() {
             assert!((sum - form.wall_area()).abs() < 1e-14, "{form:?}");
         }
     }
-    // 4π² M R is a whole torus.
+    // The area of a whole torus is 4π² M R.
     let torus_quarter = std::f64::consts::PI * std::f64::consts::PI * 0.5 * TUBE_RADIUS;
     assert!((TubeForm::Bend.wall_area() - torus_quarter).abs() < 1e-14);
 }
@@ -157,8 +183,8 @@ fn texel_areas_are_the_integral_of_the_surface() {
                         form.surface(chart, 0.5, v).area_per_uv / (STEPS * 9) as f64
                     })
                     .sum();
-                // Midpoint rule on a sine: step² / 24 of it, 3e-7; at the inner side what is left of the
-                // radius is a quarter of the sine.
+                // The midpoint rule on a sine errs by step² / 24 of it, 3e-7. On the inner side the radius
+                // that is left is a quarter of the sine.
                 assert!((sum - form.texel_area(chart, 3, j)).abs() < 2e-6 * sum);
             }
         }
@@ -182,7 +208,7 @@ fn neighbouring_charts_meet() {
                                 .any(|u| form.surface(other, u, v).position.distance(point) < 1e-14)
                         })
                         .count();
-                    // Itself and one other; in the middle of the tube u and 1 - u coincide.
+                    // The chart itself and one other.
                     assert_eq!(neighbours, 2, "{form:?} {chart} {u} {v}");
                 }
             }
@@ -202,17 +228,16 @@ fn the_mirror_of_x_and_z_keeps_the_bend() {
 
 #[test]
 fn rays_from_an_opening_cross_to_the_other() {
-    // Along the axis of the straight tube, and across the bend.
+    // Along the axis of the straight tube, across the bend, and out of the opening where it starts.
     let hit = TubeForm::Straight.first_hit(DVec3::new(0.0, 0.5, 0.5), DVec3::X);
     assert_eq!((hit.distance, hit.opening), (1.0, Some(Face::PosX)));
     let hit = TubeForm::Bend.first_hit(DVec3::new(1.0, 0.5, 0.8), DVec3::new(-1.0, 0.0, 1.0));
     assert_eq!(hit.opening, Some(Face::PosZ));
-    // Out of the opening itself, at once.
     let hit = TubeForm::Bend.first_hit(DVec3::new(1.0, 0.5, 0.5), DVec3::X);
     assert_eq!((hit.distance, hit.opening), (0.0, Some(Face::PosX)));
 }
 
-/// Rays from the wall all over the hemisphere hit nothing at once: the wall itself does not shadow.
+/// No ray from the wall into the hemisphere hits the wall where it starts.
 #[test]
 fn a_point_does_not_shadow_itself() {
     for chart in TubeForm::Bend.charts() {
@@ -224,7 +249,7 @@ fn a_point_does_not_shadow_itself() {
                 direction = -direction;
             }
             let hit = TubeForm::Bend.first_hit(at.position, direction);
-            // A chord is as long as twice the cosine by the curvature, which is at most 10.
+            // A chord has the length of twice the cosine over the curvature, which is at most 10.
             let chord = 2.0 * direction.dot(at.normal) / 10.0;
             assert!(
                 hit.opening.is_some() || hit.distance > 0.99 * chord,
@@ -235,8 +260,8 @@ fn a_point_does_not_shadow_itself() {
     }
 }
 
-/// A ray that hardly nears the plane of an opening: searched all the way there, its first dip into the wall
-/// was too short to be seen, and its hit lost digits.
+/// These rays hardly approach the plane of an opening. If they were followed all the way there, the first
+/// dip into the wall would be too short to be seen, and the hit would lose digits.
 #[test]
 fn rays_nearly_along_an_opening_keep_their_digits() {
     let form = TubeForm::Bend;
@@ -251,7 +276,7 @@ fn rays_nearly_along_an_opening_keep_their_digits() {
     assert!(form.wall_distance(hit.point).abs() < ON_WALL);
 }
 
-/// Times for the documentation; `cargo test --release -- --ignored --nocapture cost`.
+/// Prints the times that the documentation states: `cargo test --release -- --ignored --nocapture cost`.
 #[test]
 #[ignore = "prints times, checks nothing"]
 fn cost() {

@@ -1,25 +1,31 @@
-//! Singular value decomposition by one-sided Jacobi rotations (Hestenes 1958): the second method, for matrices
-//! on which nalgebra's iteration does not end.
+//! Singular value decomposition by one-sided Jacobi rotations (Hestenes 1958), for matrices on which
+//! nalgebra's iteration does not end.
 //!
-//! Pairs of columns are turned until all are orthogonal. That always ends, and finds small singular values to
-//! high relative accuracy, but takes several times as long as bidiagonalisation.
+//! Pairs of columns are rotated until all are orthogonal. This always ends, and finds small singular
+//! values to high relative accuracy, but takes several times as long as bidiagonalisation.
 
 use crate::linalg::matrix::{Matrix, MatrixView, dot};
 
-/// Pairs of columns are orthogonal when the cosine of their angle is below this.
+/// Two columns count as orthogonal if the cosine of their angle is at most this.
 const ORTHOGONAL: f64 = 1e-15;
 
-/// Columns shorter than this fraction of the longest are rounding, and become zero.
-const NOTHING: f64 = 1e-16;
+/// Columns of at most this fraction of the longest one's length are rounding, and become zero.
+const NEGLIGIBLE: f64 = 1e-16;
 
-/// Sweeps over all pairs, at most. Ten are usual; each one squares the cosines.
+/// Most sweeps over all pairs of columns. Ten are usual: each one squares the cosines.
 const MAX_SWEEPS: usize = 40;
 
-/// `a = left diag(values) rightᵀ`, unordered, for a matrix with at least as many rows as columns. Left vectors of
-/// values that are zero are zero.
-pub(super) fn one_sided_jacobi(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Matrix<f64>) {
+/// A decomposition `a = left * diag(values) * rightᵀ`, in any order of the values.
+pub(super) struct Factors {
+    pub(super) left: Matrix<f64>,
+    pub(super) values: Vec<f64>,
+    pub(super) right: Matrix<f64>,
+}
+
+/// Decomposes a matrix that has at least as many rows as columns. The left vector of a zero value is zero.
+pub(super) fn one_sided_jacobi(a: MatrixView<f64>) -> Factors {
     let (rows, columns) = (a.rows(), a.columns());
-    let mut turned: Vec<Vec<f64>> = (0..columns).map(|j| a.column(j).to_vec()).collect();
+    let mut rotated: Vec<Vec<f64>> = (0..columns).map(|j| a.column(j).to_vec()).collect();
     let mut right: Vec<Vec<f64>> = (0..columns)
         .map(|j| (0..columns).map(|i| f64::from(u8::from(i == j))).collect())
         .collect();
@@ -29,16 +35,17 @@ pub(super) fn one_sided_jacobi(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Ma
             .map(|column| dot(column, column))
             .fold(0.0, f64::max)
     };
-    let nothing = NOTHING * NOTHING * longest(&turned);
+    let negligible = NEGLIGIBLE * NEGLIGIBLE * longest(&rotated);
     for _ in 0..MAX_SWEEPS {
         let mut is_done = true;
         for q in 1..columns {
             for p in 0..q {
-                let (alpha, beta) = (dot(&turned[p], &turned[p]), dot(&turned[q], &turned[q]));
-                if alpha <= nothing || beta <= nothing {
+                let alpha = dot(&rotated[p], &rotated[p]);
+                let beta = dot(&rotated[q], &rotated[q]);
+                if alpha <= negligible || beta <= negligible {
                     continue;
                 }
-                let gamma = dot(&turned[p], &turned[q]);
+                let gamma = dot(&rotated[p], &rotated[q]);
                 if gamma.abs() <= ORTHOGONAL * (alpha * beta).sqrt() {
                     continue;
                 }
@@ -47,8 +54,8 @@ pub(super) fn one_sided_jacobi(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Ma
                 let tangent = 1.0 / (zeta.abs() + (1.0 + zeta * zeta).sqrt());
                 let tangent = if zeta < 0.0 { -tangent } else { tangent };
                 let cosine = 1.0 / (1.0 + tangent * tangent).sqrt();
-                turn(&mut turned, p, q, cosine, cosine * tangent);
-                turn(&mut right, p, q, cosine, cosine * tangent);
+                rotate(&mut rotated, p, q, cosine, cosine * tangent);
+                rotate(&mut right, p, q, cosine, cosine * tangent);
             }
         }
         if is_done {
@@ -56,22 +63,26 @@ pub(super) fn one_sided_jacobi(a: MatrixView<f64>) -> (Matrix<f64>, Vec<f64>, Ma
         }
     }
     let mut values = Vec::with_capacity(columns);
-    for column in &mut turned {
+    for column in &mut rotated {
         let square = dot(column, column);
-        let value = if square > nothing { square.sqrt() } else { 0.0 };
+        let value = if square > negligible {
+            square.sqrt()
+        } else {
+            0.0
+        };
         let scale = if value > 0.0 { 1.0 / value } else { 0.0 };
         column.iter_mut().for_each(|x| *x *= scale);
         values.push(value);
     }
-    (
-        Matrix::from_columns(rows, &turned),
+    Factors {
+        left: Matrix::from_columns(rows, &rotated),
         values,
-        Matrix::from_columns(columns, &right),
-    )
+        right: Matrix::from_columns(columns, &right),
+    }
 }
 
-/// Turns columns p and q into one another.
-fn turn(columns: &mut [Vec<f64>], p: usize, q: usize, cosine: f64, sine: f64) {
+/// Rotates columns `p < q` in the plane that they span.
+fn rotate(columns: &mut [Vec<f64>], p: usize, q: usize, cosine: f64, sine: f64) {
     let (before, from_q) = columns.split_at_mut(q);
     for (x, y) in before[p].iter_mut().zip(from_q[0].iter_mut()) {
         let (a, b) = (*x, *y);
@@ -86,13 +97,17 @@ mod tests {
     use crate::linalg::matrix::multiply;
 
     #[test]
-    fn the_parts_multiply_to_the_whole() {
+    fn the_factors_multiply_to_the_matrix() {
         // Rank 3 of 5 columns, two of them equal.
         let a = Matrix::from_fn(9, 5, |i, j| {
             let (x, y) = (i as f64 / 8.0, (j % 4) as f64);
             1.0 + x * y + 1e-3 * x * x * y * y
         });
-        let (left, values, right) = one_sided_jacobi(a.view());
+        let Factors {
+            left,
+            values,
+            right,
+        } = one_sided_jacobi(a.view());
         let back = multiply(
             left.scaled_columns(&values).view(),
             right.transposed().view(),

@@ -2,7 +2,7 @@
 
 use super::error::ReferenceError;
 use crate::geometry::cube::Face;
-use crate::reference::bounces::Bounces;
+use crate::reference::bounces::ReferenceBounces;
 use crate::reference::cells::{cell_hops, cell_of};
 use glam::DVec3;
 
@@ -57,7 +57,7 @@ pub struct ReferenceFile {
     pub terms: Vec<String>,
     /// Size of each dimension of `data`, slowest first.
     pub shape: Vec<usize>,
-    /// All numbers.
+    /// All numbers of the file.
     pub data: Vec<f32>,
 }
 
@@ -84,7 +84,7 @@ impl ReferenceFile {
     /// Indirect irradiance of every texel for a uniform albedo a, W/m²: the sum over k >= 1 of a^k
     /// times bounce k.
     ///
-    /// [`Bounces::All`] extrapolates beyond the last bounce K of the file. A closed level only spreads
+    /// [`ReferenceBounces::All`] extrapolates beyond the last bounce K of the file. A closed level only spreads
     /// light: every bounce has the same mean, and the deviations from it shrink by a factor that
     /// settles. So bounce K + n is taken as mean + ρⁿ (bounce K - mean). One ρ serves the whole level:
     /// the ratio of the norms of the last two deviations. (A ratio for each texel would amplify its
@@ -92,7 +92,7 @@ impl ReferenceFile {
     ///
     /// The extrapolated part is about a^K of the whole. Measured on exact terms, extrapolation from
     /// six bounces errs by at most 0.06 % at albedo 0.5. At 0.9 it errs by less than 0.12 % in compact
-    /// rooms, 2 % in corridors and 5 % in the maze, most of it far from the light. [`Bounces::Count`]
+    /// rooms, 2 % in corridors and 5 % in the maze, most of it far from the light. [`ReferenceBounces::Count`]
     /// up to K extrapolates nothing.
     ///
     /// # Errors
@@ -102,7 +102,7 @@ impl ReferenceFile {
     pub fn indirect_irradiance(
         &self,
         light: usize,
-        bounces: Bounces,
+        bounces: ReferenceBounces,
         albedo: f64,
     ) -> Result<Vec<f64>, ReferenceError> {
         if self.kind != Kind::Irradiance {
@@ -110,9 +110,9 @@ impl ReferenceFile {
         }
         let last = self.shape[1] - 1;
         let count = match bounces {
-            Bounces::First => 1,
-            Bounces::Count(count) => count,
-            Bounces::All => last,
+            ReferenceBounces::First => 1,
+            ReferenceBounces::Count(count) => count,
+            ReferenceBounces::All => last,
         };
         let mut sum = vec![0.0; self.shape[2..].iter().product()];
         let mut weight = 1.0;
@@ -122,7 +122,7 @@ impl ReferenceFile {
                 *s += weight * e;
             }
         }
-        if bounces == Bounces::All {
+        if bounces == ReferenceBounces::All {
             if last < 3 || !(0.0..1.0).contains(&albedo) {
                 let what = format!("sum of all bounces at albedo {albedo}");
                 return Err(self.lacks(what, format!("{last} bounces, to use below albedo 1")));
@@ -153,12 +153,12 @@ impl ReferenceFile {
     pub fn indirect_irradiance_rgb(
         &self,
         light: usize,
-        bounces: Bounces,
+        bounces: ReferenceBounces,
     ) -> Result<Vec<[f64; 3]>, ReferenceError> {
         let term = match bounces {
-            Bounces::First | Bounces::Count(1) => 0,
-            Bounces::All | Bounces::Count(RGB_BOUNCES) => 1,
-            Bounces::Count(other) => {
+            ReferenceBounces::First | ReferenceBounces::Count(1) => 0,
+            ReferenceBounces::All | ReferenceBounces::Count(RGB_BOUNCES) => 1,
+            ReferenceBounces::Count(other) => {
                 let what = format!("sum of {other} bounces");
                 return Err(self.lacks(what, self.terms.join(", ")));
             }

@@ -41,7 +41,7 @@ pub fn direct_mean(scene: &ExactScene, light: &PointLight, samples: usize) -> Ve
 /// Direct irradiance as the area means over `samples`² points of every quarter of a texel, W/m².
 ///
 /// This is the source of indirect light: a texel sends out its mean, not the value at its centre, and
-/// direct light varies most within a texel where it is strongest. Cost: one walk a point, about 0.1
+/// direct light varies most within a texel where it is strongest. Cost: one walk per point, about 0.1
 /// microseconds.
 pub fn direct_quarters(scene: &ExactScene, light: &PointLight, samples: usize) -> Vec<Quarters> {
     direct_quarters_in(scene, light, samples, |_| true)

@@ -5,7 +5,7 @@ use super::krylov::solve_gain;
 use super::quarters::{Quarters, quarters_from_centers};
 use super::scene::ExactScene;
 use super::transport::Transport;
-use crate::reference::bounces::Bounces;
+use crate::reference::bounces::ReferenceBounces;
 
 /// Relative residual of the solution for all bounces.
 pub const ALL_BOUNCES_TOLERANCE: f64 = 1e-7;
@@ -13,17 +13,17 @@ pub const ALL_BOUNCES_TOLERANCE: f64 = 1e-7;
 /// Indirect irradiance at texel centres, W/m².
 ///
 /// `direct` is the direct irradiance ([`direct_quarters`](super::direct::direct_quarters)). `albedo`
-/// holds one value for each texel, in [0, 1], and below 1 for [`Bounces::All`].
+/// holds one value for each texel, in [0, 1], and below 1 for [`ReferenceBounces::All`].
 ///
 /// # Errors
 /// - [`ExactError::Length`] if an input does not have one value for each texel.
 /// - [`ExactError::Albedo`] for an albedo out of range.
-/// - [`ExactError::NotConverged`] if [`Bounces::All`] misses [`ALL_BOUNCES_TOLERANCE`].
+/// - [`ExactError::NotConverged`] if [`ReferenceBounces::All`] misses [`ALL_BOUNCES_TOLERANCE`].
 pub fn solve(
     scene: &ExactScene,
     transport: &Transport,
     direct: &[Quarters],
-    bounces: Bounces,
+    bounces: ReferenceBounces,
     albedo: &[f64],
 ) -> Result<Vec<f64>, ExactError> {
     check_length("direct light", scene.texel_count(), direct.len())?;
@@ -40,9 +40,9 @@ pub fn solve(
     let bounce_again = |centers: &[f64]| reflect(&quarters_from_centers(scene, centers));
     let first = reflect(direct)?;
     match bounces {
-        Bounces::First => Ok(first),
-        Bounces::Count(0) => Ok(vec![0.0; first.len()]),
-        Bounces::Count(count) => {
+        ReferenceBounces::First => Ok(first),
+        ReferenceBounces::Count(0) => Ok(vec![0.0; first.len()]),
+        ReferenceBounces::Count(count) => {
             let mut sum = first.clone();
             let mut newest = first;
             for _ in 1..count {
@@ -53,7 +53,7 @@ pub fn solve(
             }
             Ok(sum)
         }
-        Bounces::All => solve_gain(bounce_again, &first, ALL_BOUNCES_TOLERANCE),
+        ReferenceBounces::All => solve_gain(bounce_again, &first, ALL_BOUNCES_TOLERANCE),
     }
 }
 
@@ -65,7 +65,7 @@ pub fn solve_rgb(
     scene: &ExactScene,
     transport: &Transport,
     direct: &[Quarters],
-    bounces: Bounces,
+    bounces: ReferenceBounces,
     albedo: &[[f64; 3]],
 ) -> Result<Vec<[f64; 3]>, ExactError> {
     let mut irradiance = vec![[0.0; 3]; scene.texel_count()];
@@ -80,8 +80,8 @@ pub fn solve_rgb(
 }
 
 /// Refuses an albedo for which there is no solution.
-fn check_albedo(albedo: &[f64], bounces: Bounces) -> Result<(), ExactError> {
-    let all = bounces == Bounces::All;
+fn check_albedo(albedo: &[f64], bounces: ReferenceBounces) -> Result<(), ExactError> {
+    let all = bounces == ReferenceBounces::All;
     let is_allowed = |a: f64| (0.0..=1.0).contains(&a) && !(all && a == 1.0);
     match albedo.iter().position(|&a| !is_allowed(a)) {
         None => Ok(()),

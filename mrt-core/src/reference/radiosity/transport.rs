@@ -73,7 +73,7 @@ impl Transport {
 }
 
 /// Irradiance at the centres of some texels from several radiosities, without storing the transport:
-/// one vector a receiver, with one value a radiosity.
+/// one vector for each receiver, with one value for each radiosity.
 ///
 /// # Errors
 /// [`ExactError::Length`] if a radiosity does not have one value for each texel.

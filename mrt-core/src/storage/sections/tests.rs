@@ -40,7 +40,7 @@ fn read<'a>(bytes: &'a [u8], section: &StoredSection) -> Result<StoredMatrix<'a>
     read_stored(&open(bytes), section, &mut ByteBudget::new(1 << 16))
 }
 
-/// The message of the error for a 2 x 2 matrix with a scale a column.
+/// The message of the error for a 2 x 2 matrix with one scale per column.
 fn refusal<T: SectionNumber, S: SectionNumber>(values: &[T], scales: &[S]) -> String {
     let file = file_with(values, scales);
     let error = read(&file, &section(2, 2, ModeAxis::Columns)).unwrap_err();
@@ -119,7 +119,7 @@ fn other_shapes_are_refused() {
             let error = read(&file, &section(rows, columns, ModeAxis::Columns)).unwrap_err();
             assert!(error.to_string().contains("count of numbers"), "{error}");
         }
-        // There is a scale a column, not a row; `f32` has none.
+        // There is one scale per column, not per row; `f32` has none.
         let other_axis = read(&file, &section(5, 3, ModeAxis::Rows));
         match storage {
             Storage::F32 => assert!(other_axis.is_ok()),

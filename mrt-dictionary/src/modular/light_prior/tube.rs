@@ -1,8 +1,10 @@
-//! Direct light in the tubes: the lights of the prior, their irradiance with shadows, and the area weights
-//! of the texels (Loos et al. 2011, sections 4 and 6.1).
+//! The light prior of round tubes: its lights, the direct light from them with shadows, and the basis of this light (Loos
+//! et al. 2011, sections 4 and 6.1).
 
-use crate::modular::one_bounce::tube::{TubeTexel, tube_texels};
-use crate::modular::transport::modes::BlockTransport;
+use crate::config::PriorConfig;
+use crate::modular::light_prior::basis::{LightPrior, light_prior};
+use crate::modular::surface::area_weights::AreaWeights;
+use crate::modular::surface::walls::tube::{TubeTexel, TubeWall};
 use glam::{DVec2, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::{TUBE_RADIUS, TubeForm};
@@ -10,6 +12,17 @@ use mrt_core::lighting::sampling::{cell_center, disk_from_square};
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
+
+/// The prior of a tube: samples of direct light, weighted by area and decomposed by the parity classes of its texels.
+pub fn tube_light_prior(
+    wall: &TubeWall,
+    weights: &AreaWeights,
+    classes: &ParityClasses,
+    config: &PriorConfig,
+) -> LightPrior {
+    let samples = tube_direct_samples(wall, config);
+    light_prior(&weights.weigh(&samples), classes, config.k_d)
+}
 
 /// A light of the prior.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,10 +35,10 @@ pub struct TubeLight {
 
 /// Sphere lights in a tube and in a straight tube attached to each opening, `per_axis`³ in each.
 ///
-/// The lattice is that of the cubes, at (i + 1) / (n + 1), with one axis laid along the tube and the other
-/// two carried to its section by the concentric map. All lights are kept, none is nearer to the wall than
-/// R times 2 / (n + 1) (0.114 for n = 6), and the lattice has every mirror of the tube. Filtering a cubic
-/// lattice instead would leave a ragged edge at the wall.
+/// As in cubes, the lattice has points at (i + 1) / (n + 1), with one axis along the tube and the other
+/// two carried to its section by the concentric map. No light is nearer to the wall than
+/// R times 2 / (n + 1) (0.114 for n = 6), and the lattice has every mirror of the tube. A cubic lattice without the
+/// lights in the wall would leave a ragged edge there.
 pub fn tube_prior_lights(form: TubeForm, per_axis: usize) -> Vec<TubeLight> {
     lattice(form, per_axis)
         .into_iter()
@@ -46,7 +59,7 @@ fn lattice(form: TubeForm, per_axis: usize) -> Vec<(TubeLight, Place)> {
             let along = (i + 1) as f64 / (n + 1) as f64;
             for row in 0..n {
                 for column in 0..n {
-                    // Centres of n cells lie at (k + 1/2) / n; those of the lattice at (k + 1) / (n + 1).
+                    // Centres of n cells lie at (k + 1/2) / n, and points of the lattice at (k + 1) / (n + 1).
                     let square = cell_center(n, row, column) * (n as f64 / (n + 1) as f64);
                     let section = disk_from_square(square) * TUBE_RADIUS;
                     let position = match beyond {
@@ -69,8 +82,8 @@ fn beyond_opening(face: Face, along: f64, section: DVec2) -> DVec3 {
     point
 }
 
-/// Irradiance at a texel's centre from a sphere light of unit intensity, zero where the wall is in the way
-/// of its centre.
+/// Irradiance at a texel's centre from a sphere light of unit intensity and the given radius; zero where the wall hides
+/// the light's centre.
 pub fn tube_irradiance(
     form: TubeForm,
     texel: &TubeTexel,
@@ -100,30 +113,24 @@ fn sees(form: TubeForm, point: DVec3, light: &TubeLight) -> bool {
 /// The samples `L_d`, texels x lights, with one light for each orbit of the mirrors, scaled by the root of the
 /// orbit's size.
 ///
-/// In the coordinates of one parity class the lights of an orbit give the same column up to its sign, so
+/// In the coordinates of one parity class the lights of an orbit give the same column up to its sign. So
 /// these few columns have the singular values and left vectors of all of them, for an eighth or a
-/// quarter of the work. Only class by class: the columns of different classes are to be folded from this matrix
-/// by [`crate::modular::light_prior::cube::light_prior`].
-pub fn tube_direct_samples(
-    form: TubeForm,
-    resolution: usize,
-    lights_per_axis: usize,
-    light_radius: f64,
-) -> Matrix<f64> {
-    let texels = tube_texels(form, resolution);
-    let lights = tube_prior_lights(form, lights_per_axis);
-    let classes = light_parity_classes(form, lights_per_axis);
+/// quarter of the work. This holds only class by class: fold the columns of each class from this matrix, as
+/// [`light_prior`] does.
+pub fn tube_direct_samples(wall: &TubeWall, config: &PriorConfig) -> Matrix<f64> {
+    let lights = tube_prior_lights(wall.form, config.lights_per_axis);
+    let classes = light_parity_classes(wall.form, config.lights_per_axis);
     let orbits: Vec<(TubeLight, f64)> = classes
         .orbits()
         .map(|orbit| (lights[orbit[0].0 as usize], (orbit.len() as f64).sqrt()))
         .collect();
-    Matrix::from_fn(texels.len(), orbits.len(), |texel, k| {
+    Matrix::from_fn(wall.texels.len(), orbits.len(), |texel, k| {
         let (light, scale) = &orbits[k];
-        scale * tube_irradiance(form, &texels[texel], light, light_radius)
+        scale * tube_irradiance(wall.form, &wall.texels[texel], light, config.light_radius)
     })
 }
 
-/// The mirrors of [`crate::modular::one_bounce::tube::tube_parity_classes`], acting on the lights.
+/// The mirrors of [`crate::modular::surface::mirrors::tube::tube_parity_classes`], acting on the lights.
 fn light_parity_classes(form: TubeForm, per_axis: usize) -> ParityClasses {
     let lights = lattice(form, per_axis);
     let n = per_axis;
@@ -149,85 +156,23 @@ fn light_parity_classes(form: TubeForm, per_axis: usize) -> ParityClasses {
     }
 }
 
-/// Area weights of a tube's texels.
-///
-/// A texel at the inner side of a bend has a ninth of the area of one at the outer side. Errors are to count
-/// by area, so decompositions run on signals times the root D of the texels' areas: F becomes D F D⁻¹,
-/// samples D L_d, and the results come back through D⁻¹. D commutes with the mirrors. Cubes need none
-/// of this, their texels being all of one size.
-#[derive(Clone, Debug)]
-pub struct AreaWeights {
-    /// Root of each texel's area over the mean area.
-    pub roots: Vec<f64>,
-}
-
-impl AreaWeights {
-    /// The weights of a tube's texels.
-    pub fn new(form: TubeForm, resolution: usize) -> Self {
-        let mean = form.wall_area() / (4 * resolution * resolution) as f64;
-        let texels = tube_texels(form, resolution);
-        Self {
-            roots: texels.iter().map(|t| (t.area / mean).sqrt()).collect(),
-        }
-    }
-
-    /// D times signals (texels x columns).
-    pub fn weigh(&self, signals: &Matrix<f64>) -> Matrix<f64> {
-        Matrix::from_fn(signals.rows(), signals.columns(), |i, j| {
-            self.roots[i] * signals[(i, j)]
-        })
-    }
-
-    /// D⁻¹ times signals (texels x columns).
-    pub fn unweigh(&self, signals: &Matrix<f64>) -> Matrix<f64> {
-        Matrix::from_fn(signals.rows(), signals.columns(), |i, j| {
-            signals[(i, j)] / self.roots[i]
-        })
-    }
-
-    /// D F D⁻¹ for an operator on texels.
-    pub fn weigh_operator(&self, operator: &Matrix<f64>) -> Matrix<f64> {
-        Matrix::from_fn(operator.rows(), operator.columns(), |i, j| {
-            self.roots[i] * operator[(i, j)] / self.roots[j]
-        })
-    }
-
-    /// The operators of a block in terms of plain texel values, from those that
-    /// [`crate::modular::transport::modes::block_transport`] gave for weighted F and prior.
-    pub fn unweigh_transport(&self, weighted: BlockTransport) -> BlockTransport {
-        let coefficients = &weighted.coefficients_from_direct;
-        BlockTransport {
-            indirect_basis: self.unweigh(&weighted.indirect_basis),
-            coefficients_from_direct: coefficients.scaled_columns(&self.roots),
-            implicit_lighting: self.unweigh(&weighted.implicit_lighting),
-            singular_values: weighted.singular_values,
-            dropped_energy: weighted.dropped_energy,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modular::light_prior::cube::light_prior;
-    use crate::modular::one_bounce::tube::{Parts, tube_bounce, tube_parity_classes};
-    use crate::modular::transport::modes::{block_transport, fold_bounce};
-    use crate::progress::Progress;
-    use mrt_core::linalg::matrix::{multiply, transpose_multiply};
+    use crate::modular::surface::mirrors::tube::tube_parity_classes;
     use mrt_core::linalg::svd::svd;
 
     const RADIUS: f64 = 0.1;
 
-    fn all_samples(form: TubeForm, resolution: usize, per_axis: usize) -> Matrix<f64> {
-        let texels = tube_texels(form, resolution);
-        let lights = tube_prior_lights(form, per_axis);
-        Matrix::from_fn(texels.len(), lights.len(), |i, j| {
-            tube_irradiance(form, &texels[i], &lights[j], RADIUS)
+    fn all_samples(wall: &TubeWall, per_axis: usize) -> Matrix<f64> {
+        let lights = tube_prior_lights(wall.form, per_axis);
+        Matrix::from_fn(wall.texels.len(), lights.len(), |i, j| {
+            tube_irradiance(wall.form, &wall.texels[i], &lights[j], RADIUS)
         })
     }
 
     #[test]
-    fn lights_keep_their_radius_from_the_wall() {
+    fn lights_stand_further_from_the_wall_than_their_radius() {
         for form in TubeForm::ALL {
             let lights = tube_prior_lights(form, 6);
             assert_eq!(lights.len(), 3 * 216);
@@ -250,12 +195,17 @@ mod tests {
     }
 
     #[test]
-    fn one_light_an_orbit_stands_for_all() {
+    fn one_light_of_each_orbit_stands_for_all_lights() {
         for form in TubeForm::ALL {
-            let (resolution, per_axis) = (4, 3);
-            let classes = tube_parity_classes(form, resolution);
-            let few = tube_direct_samples(form, resolution, per_axis, RADIUS);
-            let all = all_samples(form, resolution, per_axis);
+            let wall = TubeWall::new(form, 4);
+            let classes = tube_parity_classes(&wall);
+            let config = PriorConfig {
+                lights_per_axis: 3,
+                light_radius: RADIUS,
+                ..PriorConfig::default()
+            };
+            let few = tube_direct_samples(&wall, &config);
+            let all = all_samples(&wall, config.lights_per_axis);
             for class in 0..classes.class_count() {
                 let values =
                     |m: &Matrix<f64>| svd(classes.fold_columns(class, m).view()).singular_values;
@@ -270,10 +220,10 @@ mod tests {
     }
 
     #[test]
-    fn what_is_lit_is_what_rays_reach() {
+    fn lights_shine_where_rays_reach_them() {
         for form in TubeForm::ALL {
             let (mut lit, mut shadowed) = (0, 0);
-            for texel in tube_texels(form, 6) {
+            for texel in TubeWall::new(form, 6).texels {
                 for light in tube_prior_lights(form, 4) {
                     let offset = light.position - texel.center.position;
                     if texel.center.normal.dot(offset) <= 0.0 {
@@ -295,66 +245,6 @@ mod tests {
                 // No light of the prior hugs the inner side: shadows are few.
                 TubeForm::Bend => assert!(shadowed > 0 && shadowed < lit / 10),
             }
-        }
-    }
-
-    #[test]
-    fn weights_have_the_texels_mean_and_cancel() {
-        let weights = AreaWeights::new(TubeForm::Bend, 8);
-        let mean = weights.roots.iter().map(|r| r * r).sum::<f64>() / weights.roots.len() as f64;
-        assert!((mean - 1.0).abs() < 1e-13);
-        let straight = AreaWeights::new(TubeForm::Straight, 8);
-        assert!(straight.roots.iter().all(|r| (r - 1.0).abs() < 1e-14));
-    }
-
-    /// The operators of a bend, weighted: all modes hold F on the prior's light, few of them nearly.
-    #[test]
-    fn reduced_transport_projects_by_area() {
-        let (form, resolution) = (TubeForm::Bend, 8);
-        let classes = tube_parity_classes(form, resolution);
-        let weights = AreaWeights::new(form, resolution);
-        let bounce = tube_bounce(form, resolution, Parts::STANDARD, &Progress::silent())
-            .expect("nobody cancels");
-        let samples = tube_direct_samples(form, resolution, 4, RADIUS);
-        let prior = light_prior(&weights.weigh(&samples), &classes, usize::MAX);
-        let folded = fold_bounce(&weights.weigh_operator(&bounce), &classes);
-        let transport = |modes| {
-            weights.unweigh_transport(block_transport(
-                &folded,
-                &folded,
-                &prior.basis,
-                &classes,
-                modes,
-            ))
-        };
-        let all = all_samples(form, resolution, 4);
-        let exact = multiply(bounce.view(), all.view());
-        let norm = |m: &Matrix<f64>| weights.weigh(m).frobenius_norm();
-        let error = |transport: &BlockTransport| {
-            let b = multiply(transport.coefficients_from_direct.view(), all.view());
-            let found = multiply(transport.indirect_basis.view(), b.view());
-            let difference = Matrix::from_fn(found.rows(), found.columns(), |i, j| {
-                found[(i, j)] - exact[(i, j)]
-            });
-            norm(&difference) / norm(&exact)
-        };
-        assert!(error(&transport(usize::MAX)) < 1e-9);
-        let reduced = transport(32);
-        assert!(error(&reduced) < 0.02, "{}", error(&reduced));
-        // U_b = F L_imp, and its columns are orthogonal by area.
-        let made = multiply(bounce.view(), reduced.implicit_lighting.view());
-        let weighted = weights.weigh(&reduced.indirect_basis);
-        let gram = transpose_multiply(weighted.view(), weighted.view());
-        for j in 0..gram.columns() {
-            for i in 0..gram.rows() {
-                let s = reduced.singular_values[j];
-                let expected = if i == j { s * s } else { 0.0 };
-                let scale = s * reduced.singular_values[i];
-                assert!((gram[(i, j)] - expected).abs() < 1e-9 * scale);
-            }
-        }
-        for (a, b) in made.data().iter().zip(reduced.indirect_basis.data()) {
-            assert!((a - b).abs() < 1e-9 * reduced.singular_values[0]);
         }
     }
 }

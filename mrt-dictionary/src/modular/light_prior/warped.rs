@@ -1,19 +1,21 @@
 //! The light prior of a warped block: the canonical lights taken along by the warp (Loos et al. 2011, section 8:
 //! "a prior that uses the aspect ratio of the scene's bounding box").
 
-use crate::modular::one_bounce::warped::WarpedWalls;
+use crate::modular::light_prior::cube::lattice_lights;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::Matrix;
 
-/// How much wider than across lights may stand along the longest edge before more of them are placed there.
-/// With the same number along all edges a box 1:1:20 errs by 38 % instead of 10; denser ones gain nothing.
+/// How much further apart lights may stand along the longest edge than along the second longest before more of them are
+/// placed there. With the same number along all edges a box 1:1:20 errs by 38 % instead of 10; denser lights gain
+/// nothing.
 const LIGHT_SPACING: f64 = 2.0;
 
 /// Centres of the prior's lights in the unit cube's coordinates: the lattice of
-/// [`crate::modular::light_prior::cube::prior_lights`], in the cube and in the cell beyond each opening, with `per_axis` lights
-/// along an edge, and up to `resolution` along the longest one of a stretched block.
+/// [`crate::modular::light_prior::cube::prior_lights`], in the cube and in the cell beyond each opening. `per_axis` lights
+/// stand along an edge, and up to the walls' `resolution` along the longest edge of a stretched block.
 pub fn warped_prior_lights(walls: &WarpedWalls, openings: &[Face], per_axis: usize) -> Vec<DVec3> {
     let jacobian = walls.warp.jacobian(DVec3::splat(0.5));
     let lengths = [0, 1, 2].map(|axis| jacobian.col(axis).length());
@@ -22,25 +24,10 @@ pub fn warped_prior_lights(walls: &WarpedWalls, openings: &[Face], per_axis: usi
         let wanted = (per_axis as f64 * lengths[axis] / (second * LIGHT_SPACING)).round();
         (wanted as usize).min(walls.resolution).max(per_axis)
     });
-    let place = |k: usize, count: usize| (k + 1) as f64 * (1.0 / (count + 1) as f64);
-    let lattice: Vec<DVec3> = (0..counts[0] * counts[1] * counts[2])
-        .map(|k| {
-            let (x, rest) = (k % counts[0], k / counts[0]);
-            let (y, z) = (rest % counts[1], rest / counts[1]);
-            DVec3::new(
-                place(x, counts[0]),
-                place(y, counts[1]),
-                place(z, counts[2]),
-            )
-        })
-        .collect();
-    std::iter::once(DVec3::ZERO)
-        .chain(openings.iter().map(|face| face.outward()))
-        .flat_map(|cell| lattice.iter().map(move |&p| p + cell))
-        .collect()
+    lattice_lights(counts, openings)
 }
 
-/// Radius of the prior's lights on a warped block, world units: `radius` times the least distance of
+/// Radius of the prior's lights on a warped block, world units: `radius` times the smallest distance between
 /// opposite faces, at the block's centre. Halving or doubling it moves errors by less than 1 %.
 pub fn warped_light_radius(walls: &WarpedWalls, radius: f64) -> f64 {
     let gradients = walls.warp.jacobian(DVec3::splat(0.5)).inverse().transpose();
@@ -54,8 +41,8 @@ pub fn warped_light_radius(walls: &WarpedWalls, radius: f64) -> f64 {
 /// Direct irradiance `L_d` on warped walls, texels x lights, from sphere lights of unit intensity.
 ///
 /// `lights` are in the unit cube's coordinates and go through the warp, those beyond openings too; `radius` is
-/// in world units. Every texel sees every light that is above its horizon: the caller masks what an opening
-/// that is smaller than its face hides.
+/// in world units. Every texel sees every light above its horizon: where an opening is smaller than its face, the
+/// caller masks what the rest of the face hides.
 pub fn warped_direct_samples(walls: &WarpedWalls, lights: &[DVec3], radius: f64) -> Matrix<f64> {
     let lights: Vec<DVec3> = lights.iter().map(|&p| walls.warp.point(p)).collect();
     Matrix::from_fn(walls.texel_count(), lights.len(), |texel, light| {

@@ -5,19 +5,25 @@
 //! lightfield is radiance at positions on that face and directions into the half-space z > 0, the latter on
 //! Shirley and Chiu's square with equal solid angles. What a sample is worth to anything behind the
 //! interface is its flux, so scalar products weigh it with cos θ; the paper leaves samples unweighted.
+//!
+//! At the round openings of tubes (section 6.1) only the positions differ: the square of positions is carried to the
+//! disc of radius [`TUBE_RADIUS`] by the concentric map of Shirley and Chiu. All samples then lie in the
+//! opening, with equal areas, and interpolation never mixes light with the dark beside the opening, as it
+//! would where a square grid is masked. The map has every mirror and quarter turn of the grid.
 
 use crate::config::LightfieldConfig;
 use glam::{DVec2, DVec3};
 use mrt_core::geometry::cube::{CubeRotation, Face};
+use mrt_core::geometry::tube::TUBE_RADIUS;
 use mrt_core::lighting::sampling::{
     cell_center, square_from_uniform_hemisphere, uniform_hemisphere_from_square,
 };
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
-/// The sample grid of the canonical interface. Sample index is
-/// `((row_v * positions + column_u) * directions + row_y) * directions + column_x`.
+/// The sample grid of the canonical interface. Directions count fastest ([`LightfieldGrid::sample`]).
 #[derive(Clone, Debug)]
 pub struct LightfieldGrid {
     /// Positions along each axis.
@@ -31,12 +37,25 @@ pub struct LightfieldGrid {
     super_directions: Vec<Vec<DVec3>>,
 }
 
-/// One corner of an interpolation: a sample and its weight.
+/// Column and row of a sample's position and of its direction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SamplePlace {
+    /// Column of the position, along u.
+    pub u: usize,
+    /// Row of the position, along v.
+    pub v: usize,
+    /// Column of the direction.
+    pub x: usize,
+    /// Row of the direction.
+    pub y: usize,
+}
+
+/// One term of an interpolation: a sample and its weight.
 pub type Tap = (usize, f64);
 
 impl LightfieldGrid {
-    /// A grid with `super_samples`² directions for each direction cell.
-    pub fn new(config: &LightfieldConfig) -> Self {
+    /// A grid on square openings, with `super_samples`² directions for each direction cell.
+    pub fn on_squares(config: &LightfieldConfig) -> Self {
         let (positions, directions) = (config.positions, config.directions);
         let fine = directions * config.super_samples;
         let super_directions: Vec<Vec<DVec3>> = (0..directions * directions)
@@ -51,7 +70,7 @@ impl LightfieldGrid {
                     .collect()
             })
             .collect();
-        let solid_angle = 2.0 * std::f64::consts::PI / (directions * directions) as f64;
+        let solid_angle = 2.0 * PI / (directions * directions) as f64;
         let area = 1.0 / (positions * positions) as f64;
         let root_weights = super_directions
             .iter()
@@ -68,14 +87,57 @@ impl LightfieldGrid {
         }
     }
 
-    /// Samples in all.
+    /// A grid on the round openings of tubes: weights have the disc's share of the square's area.
+    pub fn on_discs(config: &LightfieldConfig) -> Self {
+        let mut grid = Self::on_squares(config);
+        let root_share = (PI * TUBE_RADIUS * TUBE_RADIUS).sqrt();
+        grid.root_weights.iter_mut().for_each(|w| *w *= root_share);
+        grid
+    }
+
+    /// Number of samples.
     pub fn sample_count(&self) -> usize {
         self.positions * self.positions * self.direction_count()
     }
 
-    /// Directions at each position.
+    /// Number of directions at each position.
     pub fn direction_count(&self) -> usize {
         self.directions * self.directions
+    }
+
+    /// Index of the sample at a place: `((v * positions + u) * directions + y) * directions + x`.
+    pub fn sample(&self, SamplePlace { u, v, x, y }: SamplePlace) -> usize {
+        ((v * self.positions + u) * self.directions + y) * self.directions + x
+    }
+
+    /// Inverse of [`LightfieldGrid::sample`].
+    pub fn place(&self, sample: usize) -> SamplePlace {
+        let (x, rest) = (sample % self.directions, sample / self.directions);
+        let (y, rest) = (rest % self.directions, rest / self.directions);
+        SamplePlace {
+            u: rest % self.positions,
+            v: rest / self.positions,
+            x,
+            y,
+        }
+    }
+
+    /// The place that the mirror of u takes a sample to.
+    pub fn mirrored_u(&self, place: SamplePlace) -> SamplePlace {
+        SamplePlace {
+            u: self.positions - 1 - place.u,
+            x: self.directions - 1 - place.x,
+            ..place
+        }
+    }
+
+    /// The place that the mirror of v takes a sample to.
+    pub fn mirrored_v(&self, place: SamplePlace) -> SamplePlace {
+        SamplePlace {
+            v: self.positions - 1 - place.v,
+            y: self.directions - 1 - place.y,
+            ..place
+        }
     }
 
     /// Root of the weight of a sample in scalar products.
@@ -83,7 +145,7 @@ impl LightfieldGrid {
         self.root_weights[sample % self.direction_count()]
     }
 
-    /// Super-sample directions of a direction cell.
+    /// Unit directions of the super-samples of a direction cell.
     pub fn super_directions(&self, direction: usize) -> &[DVec3] {
         &self.super_directions[direction]
     }
@@ -102,13 +164,12 @@ impl LightfieldGrid {
         let [dx, dy] = [square.x, square.y].map(|x| bracket(x, self.directions));
         let mut taps = [(0, 0.0); 16];
         let mut next = 0;
-        for (j, wj) in pv {
-            for (i, wi) in pu {
+        for (v, wv) in pv {
+            for (u, wu) in pu {
                 for (y, wy) in dy {
                     for (x, wx) in dx {
-                        let sample =
-                            ((j * self.positions + i) * self.directions + y) * self.directions + x;
-                        taps[next] = (sample, wj * wi * wy * wx);
+                        let sample = self.sample(SamplePlace { u, v, x, y });
+                        taps[next] = (sample, wv * wu * wy * wx);
                         next += 1;
                     }
                 }
@@ -117,33 +178,21 @@ impl LightfieldGrid {
         taps
     }
 
-    /// Classes under the mirrors of u (bit 0) and of v (bit 1).
+    /// Parity classes of the samples under the mirrors of u (bit 0) and of v (bit 1).
     pub fn parity_classes(&self) -> ParityClasses {
-        let (p, d) = (self.positions, self.directions);
-        let permutation = |mirror_u: bool| -> Vec<u32> {
+        let permutation = |image: &dyn Fn(SamplePlace) -> SamplePlace| -> Vec<u32> {
             (0..self.sample_count())
-                .map(|sample| {
-                    let (x, rest) = (sample % d, sample / d);
-                    let (y, rest) = (rest % d, rest / d);
-                    let (i, j) = (rest % p, rest / p);
-                    let image = if mirror_u {
-                        ((j * p + (p - 1 - i)) * d + y) * d + (d - 1 - x)
-                    } else {
-                        (((p - 1 - j) * p + i) * d + (d - 1 - y)) * d + x
-                    };
-                    image as u32
-                })
+                .map(|sample| self.sample(image(self.place(sample))) as u32)
                 .collect()
         };
-        ParityClasses::new(
-            self.sample_count(),
-            &[permutation(true), permutation(false)],
-        )
+        let mirror_u = permutation(&|place| self.mirrored_u(place));
+        let mirror_v = permutation(&|place| self.mirrored_v(place));
+        ParityClasses::new(self.sample_count(), &[mirror_u, mirror_v])
     }
 
-    /// Evaluates `modes` signals at all samples in parallel, one position after the other:
-    /// `at(position, direction cell, out)` fills the values of all modes at one sample. Returns samples x
-    /// modes.
+    /// Evaluates `modes` signals at all samples, samples x modes, over the threads.
+    ///
+    /// `at(position, direction cell, out)` writes the values of all modes at one sample over zeros.
     pub fn tabulate(
         &self,
         modes: usize,
@@ -176,7 +225,7 @@ impl LightfieldGrid {
     }
 }
 
-/// The two cells of n between whose centres x in [0, 1] lies, with weights.
+/// The two of n cells between whose centres x in [0, 1] lies, with weights.
 fn bracket(x: f64, n: usize) -> [(usize, f64); 2] {
     let x = x * n as f64 - 0.5;
     let low = x.floor();
@@ -187,7 +236,7 @@ fn bracket(x: f64, n: usize) -> [(usize, f64); 2] {
 
 /// The rotation about +Y that takes the canonical interface's heading +z to `heading`, a side
 /// direction.
-pub fn frame_of_heading(heading: Face) -> CubeRotation {
+pub fn turn_to_heading(heading: Face) -> CubeRotation {
     CubeRotation::about_y_to(heading).unwrap_or(CubeRotation::IDENTITY)
 }
 
@@ -196,7 +245,7 @@ mod tests {
     use super::*;
 
     fn grid() -> LightfieldGrid {
-        LightfieldGrid::new(&LightfieldConfig {
+        LightfieldGrid::on_squares(&LightfieldConfig {
             positions: 4,
             directions: 6,
             super_samples: 2,
@@ -211,8 +260,8 @@ mod tests {
             .map(|s| grid.root_weight(s) * grid.root_weight(s))
             .sum();
         // The mean cosine over equal solid angles is 1/2. It is 1 - max(a, b)² on the square, whose
-        // midpoint rule over n² cells is too large by 2/n² of it; n is 6 cells of 2 super-samples.
-        let excess = flux / std::f64::consts::PI - 1.0;
+        // midpoint rule over n² cells is too large by the fraction 2/n²; n is 6 cells of 2 super-samples.
+        let excess = flux / PI - 1.0;
         assert!((excess - 2.0 / 144.0).abs() < 1e-12, "{excess}");
     }
 

@@ -2,31 +2,31 @@
 //!
 //! F maps outgoing radiosity, given by its value at the texel centres, to incident irradiance at the
 //! texel centres. A cube with missing faces is convex, so every texel sees every wall whole and Lambert's
-//! polygon formula gives each element exactly. The paper traces rays instead; [`crate::modular::one_bounce::rays`] does
-//! so too, as the second implementation that tests compare with this one.
+//! polygon formula gives each element exactly. The paper traces rays instead.
 
-use crate::modular::surface::mirrors::texel_parity_classes;
+use crate::modular::one_bounce::orbits::{from_orbit_rows, orbit_receivers};
+use crate::modular::surface::mirrors::cube::texel_parity_classes;
+use crate::modular::surface::walls::cube::part_in_hole;
 use crate::progress::{Cancelled, Progress};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_runtime::blocks::{SHAPES, Shape};
-use mrt_runtime::low_level::level::shape::Outline;
 use rayon::prelude::*;
 
 /// How radiosity between texel centres is reconstructed from the values there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reconstruction {
-    /// One value a texel, its centre's; what bakes use. Estimating each texel's mean from its neighbours'
-    /// values errs more at 16² (0.35 % against 0.22 % on the cube's reference file), bilinear 0.40 %.
+    /// Every texel has the value of its centre. Bakes use this. On the cube's reference file at 16² it errs by 0.22 %,
+    /// against 0.35 % with each texel's mean estimated from its neighbours' values and 0.40 % with
+    /// [`Reconstruction::Bilinear`].
     Constant,
-    /// Bilinear between centres, constant beyond the outermost; how the paper's table 2 was probably
-    /// measured.
+    /// Bilinear between centres, constant beyond the outermost. The paper's table 2 was probably measured like this.
     Bilinear,
 }
 
-/// Parts into which a texel is cut, along each axis, to integrate a bilinear reconstruction.
+/// Number of parts, along each axis, into which a texel is cut to integrate a bilinear reconstruction.
 const BILINEAR_PARTS: usize = 4;
 
 /// The operator of the closed cube at `resolution`² texels a face, texels x texels.
@@ -34,7 +34,7 @@ const BILINEAR_PARTS: usize = 4;
 /// Cost: resolution⁴ x 30 polygon evaluations, an eighth of that by symmetry; 0.2 s at 16².
 ///
 /// # Errors
-/// [`Cancelled`], when the caller's progress says so.
+/// [`Cancelled`], if the caller has asked to stop.
 pub fn closed_cube_bounce(
     resolution: usize,
     reconstruction: Reconstruction,
@@ -43,30 +43,19 @@ pub fn closed_cube_bounce(
     let shape = &SHAPES[0];
     let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
     let classes = texel_parity_classes(shape, resolution);
-    // One receiver an orbit of the mirrors; the others' rows are permutations of its row.
-    let orbits: Vec<&[(u32, u32)]> = classes.orbits().collect();
-    let rows: Vec<Vec<f64>> = orbits
-        .par_iter()
-        .map(|orbit| {
+    let rows: Vec<Vec<f64>> = orbit_receivers(&classes)
+        .into_par_iter()
+        .map(|receiver| {
             progress.check()?;
-            let (face, point) = texels[orbit[0].0 as usize];
+            let (face, point) = texels[receiver];
             Ok(receiver_row(face, point, resolution, reconstruction))
         })
         .collect::<Result<_, Cancelled>>()?;
-    let mut bounce = Matrix::zeros(texels.len(), texels.len());
-    for (orbit, row) in orbits.iter().zip(&rows) {
-        for &(receiver, element) in *orbit {
-            for (source, &factor) in row.iter().enumerate() {
-                let image = classes.image(element, source as u32);
-                bounce[(receiver as usize, image as usize)] = factor;
-            }
-        }
-    }
-    Ok(bounce)
+    Ok(from_orbit_rows(&classes, &rows))
 }
 
-/// The operator of a shape: the closed cube's, without the rows and columns of missing faces, and with holes cut
-/// out of the texels that they touch.
+/// The operator of a shape, from that of the closed cube: without the rows and columns of missing faces, and with holes
+/// cut out of the texels that they touch.
 pub fn restrict_to_shape(closed: &Matrix<f64>, shape: &Shape, resolution: usize) -> Matrix<f64> {
     let kept: Vec<usize> = shape
         .walls()
@@ -80,17 +69,17 @@ pub fn restrict_to_shape(closed: &Matrix<f64>, shape: &Shape, resolution: usize)
     bounce
 }
 
-/// Takes the part of each source texel that is in a hole away, exactly; receivers in a hole get nothing.
+/// Subtracts the part of each source texel that is in a hole, exactly, and clears the rows of receivers in a hole.
 fn cut_holes(bounce: &mut Matrix<f64>, shape: &Shape, resolution: usize) {
     let texels: Vec<(Face, DVec3)> = shape.texels(resolution).collect();
     for (source, &(face, center)) in texels.iter().enumerate() {
-        let Some(missing) = missing_part(shape, face, center, resolution) else {
+        let Some(hole) = part_in_hole(shape, face, center, resolution) else {
             continue;
         };
         for (receiver, &(wall, point)) in texels.iter().enumerate() {
             if wall != face {
-                let factor = point_to_polygon(point, -wall.outward(), &missing);
-                // Where the whole texel is missing, what is left is rounding.
+                let factor = point_to_polygon(point, -wall.outward(), &hole);
+                // Where the hole takes the whole texel, what is left is rounding.
                 let rest = bounce[(receiver, source)] - factor;
                 bounce[(receiver, source)] = if rest < 1e-13 { 0.0 } else { rest };
             }
@@ -103,29 +92,6 @@ fn cut_holes(bounce: &mut Matrix<f64>, shape: &Shape, resolution: usize) {
             }
         }
     }
-}
-
-/// The part of a texel that is in the hole of its wall.
-fn missing_part(shape: &Shape, face: Face, center: DVec3, resolution: usize) -> Option<[DVec3; 4]> {
-    let Outline::Hole(hole) = shape.opening(face)?.outline else {
-        return None;
-    };
-    let half = 0.5 / resolution as f64;
-    let overlap = |axis: usize, [low, high]: [f64; 2]| {
-        [low.max(center[axis] - half), high.min(center[axis] + half)]
-    };
-    let [u, v] = hole.rectangle();
-    let (u, v) = (overlap(face.u_axis(), u), overlap(face.v_axis(), v));
-    (u[0] < u[1] && v[0] < v[1]).then(|| face.rectangle(u, v))
-}
-
-/// Fraction of a texel that is wall.
-pub fn wall_fraction(shape: &Shape, face: Face, center: DVec3, resolution: usize) -> f64 {
-    let Some([a, b, _, d]) = missing_part(shape, face, center, resolution) else {
-        return 1.0;
-    };
-    let area = (b - a).length() * (d - a).length() * (resolution * resolution) as f64;
-    (1.0 - area).max(0.0)
 }
 
 /// Factors from all texels of the closed cube to one receiver.

@@ -1,21 +1,20 @@
 //! What shapes send through their openings, reduced: one basis for all of them.
 //!
 //! Light that leaves through an opening is the radiosity of the walls behind it, so the paths of a table start
-//! from a basis for radiosity on the walls of [`EMITTER`]. A texel counts with its form factor to the opening: in
-//! that norm the scalar product of two signals is that of the lightfields that they send (the paper reduces the
-//! lightfields themselves, section 5.1).
+//! from a basis for radiosity on the walls of [`EMITTER`]. A texel counts with its form factor to the opening. In
+//! that norm two signals have the scalar product of the lightfields that they send. (The paper reduces the
+//! lightfields themselves, section 5.1.)
 
-use crate::modular::one_bounce::cube::wall_fraction;
-use crate::modular::paths::transport::{EMITTER, texel_at};
-use crate::modular::surface::mirrors::texel_parity_classes;
+use crate::matrix_parts::scaled_rows;
+use crate::modular::paths::ends::{EMITTER, PathFrame};
+use crate::modular::surface::mirrors::cube::texel_parity_classes;
+use crate::modular::surface::walls::cube::{texel_at, wall_fraction};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
-use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity_modes::{GramModes, ModeChoice, add_gram_of_rows};
 use mrt_runtime::blocks::Shape;
-use mrt_runtime::low_level::modular::path::frame_of_heading;
 
 /// The emission basis.
 #[derive(Clone, Debug)]
@@ -32,16 +31,16 @@ pub struct EmissionBasis {
     pub dropped_energy: f64,
 }
 
-/// Radiosity of a shape's walls (texels x signals) as that of the emitter behind one of its openings, in the frame
-/// of its heading or in that with x and y exchanged.
+/// Radiosity of a shape's walls (texels x signals) carried over to the texels of [`EMITTER`], which takes the place of the
+/// shape behind one of its openings, in one of the frames there. Holes take away their part of a texel.
 pub fn emitter_radiosity(
     shape: &Shape,
     opening: Face,
-    is_exchanged: bool,
+    frame: PathFrame,
     radiosity: &Matrix<f64>,
     resolution: usize,
 ) -> Matrix<f64> {
-    let frame = opening_frame(opening, is_exchanged);
+    let frame = frame.of_heading(opening);
     let rows: Vec<Option<(usize, f64)>> = EMITTER
         .texels(resolution)
         .map(|(face, center)| {
@@ -55,17 +54,7 @@ pub fn emitter_radiosity(
     })
 }
 
-/// From the canonical frame of a path to a shape's, through an opening that light leaves by.
-pub fn opening_frame(opening: Face, is_exchanged: bool) -> CubeSymmetry {
-    let frame = frame_of_heading(opening);
-    if is_exchanged {
-        frame.after(CubeSymmetry::exchange(0, 1))
-    } else {
-        frame
-    }
-}
-
-/// Reduces what shapes send: radiosities of the emitter, texels x signals, of equal importance.
+/// Reduces what shapes send: radiosities of the emitter, texels x signals, which all count alike.
 pub fn emission_basis(sent: &[Matrix<f64>], resolution: usize, modes: usize) -> EmissionBasis {
     let classes = texel_parity_classes(&EMITTER, resolution);
     let root_weights: Vec<f64> = EMITTER
@@ -94,13 +83,6 @@ pub fn emission_basis(sent: &[Matrix<f64>], resolution: usize, modes: usize) -> 
         dropped_energy: basis.dropped_energy,
         scales: basis.scales,
     }
-}
-
-/// Every row times its scale.
-pub(crate) fn scaled_rows(matrix: &Matrix<f64>, scales: &[f64]) -> Matrix<f64> {
-    Matrix::from_fn(matrix.rows(), matrix.columns(), |i, j| {
-        scales[i] * matrix[(i, j)]
-    })
 }
 
 /// Form factor from a texel of the emitter to its opening.

@@ -1,25 +1,28 @@
 //! Light through the openings of a warped block, in the terms of the canonical ones.
 //!
-//! The operators between openings are those of unit cubes. What passes an opening is a lightfield, and that of a
-//! long block differs from a cube's: its walls end further away, and a far wall sees less of the opening. The paper
-//! scales the canonical operators with the block and leaves it at that. Here both ends are corrected, from the
-//! middle of the opening, in coordinates in which the opening is the unit square and depth has the scale of its area:
+//! The operators between openings are those of unit cubes. But the lightfield at an opening of a long block differs from
+//! that of a cube: the block's walls end further away, and a far wall sees less of the opening. The paper
+//! scales the canonical operators with the block and does no more. Here both ends are corrected, as seen from the
+//! middle of the opening, in coordinates in which the opening is the unit square and depth is scaled by the root of
+//! its area:
 //!
 //! - light that leaves is the radiosity of a unit cube behind the opening that looks the same from there;
 //! - light that enters falls on a wall where a ray from there would go on to the wall of a unit cube, times the
 //!   form factor of the opening on the true wall over that on the cube's.
 //!
 //! Both are exact for cubes of any size and angle, and give even light its true level for every warp. In a dead end
-//! four times as long as wide behind a cube they leave 7 % of error where scaled operators err by 135. Light that passes
-//! *through* a warped block is corrected as a level is assembled (`mrt-runtime/src/propagate/transit.rs`).
+//! four times as long as wide behind a cube they err by 7 % where scaled operators err by 135. Light that passes
+//! *through* a warped block is corrected as a level is assembled (`propagate/transit.rs` in `mrt-runtime`).
 
-use crate::modular::joint::{ForeignLight, response_at};
-use crate::modular::one_bounce::cube::wall_fraction;
-use crate::modular::one_bounce::warped::WarpedWalls;
-use crate::modular::outputs::cube::{DIRECTIONS, PROBE_WEIGHT, ProbeSamples, SH9, probe_points};
-use crate::modular::paths::emission::opening_frame;
-use crate::modular::paths::response::{ResponseBasis, rows, stack};
-use crate::modular::paths::transport::{EMITTER, RECEIVER};
+use crate::matrix_parts::{rows, stack};
+use crate::modular::outputs::polygon_light::SH9;
+use crate::modular::outputs::probe_samples::{PROBE_WEIGHT, ProbeSamples};
+use crate::modular::paths::arrival::{Arrival, ArrivingLight};
+use crate::modular::paths::ends::{EMITTER, PathFrame, RECEIVER};
+use crate::modular::paths::response::ResponseBasis;
+use crate::modular::surface::probes::{DIRECTIONS, probe_points};
+use crate::modular::surface::walls::cube::wall_fraction;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use glam::{DMat3, DVec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
@@ -30,7 +33,6 @@ use mrt_core::lighting::sh;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_runtime::blocks::Shape;
 use mrt_runtime::low_level::level::shape::Aperture;
-use mrt_runtime::low_level::modular::path::frame_of_heading;
 use rayon::prelude::*;
 
 /// Rays along each axis of a texel of the canonical emitter.
@@ -39,6 +41,9 @@ const RAYS: usize = 3;
 /// Halvings in search of the wall that a ray ends on: 1e-9 of the block.
 const HALVINGS: usize = 32;
 
+/// Form factors below this are grazing, and quotients of them are rounding errors.
+const LEAST_FACTOR: f64 = 1e-9;
+
 /// Steps of the polar decomposition. Ten reach rounding from a stretch of 1:100.
 const POLAR_STEPS: usize = 16;
 
@@ -46,20 +51,25 @@ const POLAR_STEPS: usize = 16;
 pub struct OpeningView<'a> {
     shape: &'static Shape,
     walls: &'a WarpedWalls,
-    aperture: &'static Aperture,
-    /// Middle of the opening, in the unit cube and in the world.
+    face: Face,
+    /// Corners of the opening in the unit cube.
+    unit_corners: Vec<DVec3>,
+    /// Corners of the opening in the world.
+    corners: Vec<DVec3>,
+    /// Middle of the opening in the unit cube.
     unit_eye: DVec3,
+    /// Middle of the opening in the world.
     eye: DVec3,
     /// From directions of the unit cube to those of the world.
     world: DMat3,
 }
 
 impl<'a> OpeningView<'a> {
-    /// From an opening of a shape whose walls these are.
+    /// The view from an opening of a shape, whose walls these are.
     pub fn new(shape: &'static Shape, walls: &'a WarpedWalls, aperture: &'static Aperture) -> Self {
         let face = aperture.face;
-        let corners = aperture.corners();
-        let unit_eye = corners.iter().copied().sum::<DVec3>() / corners.len() as f64;
+        let unit_corners: Vec<DVec3> = aperture.corners().into_iter().collect();
+        let unit_eye = unit_corners.iter().copied().sum::<DVec3>() / unit_corners.len() as f64;
         let jacobian = walls.warp.jacobian(unit_eye);
         let (u, v) = (jacobian.col(face.u_axis()), jacobian.col(face.v_axis()));
         let across = u.cross(v);
@@ -73,29 +83,29 @@ impl<'a> OpeningView<'a> {
         Self {
             shape,
             walls,
-            aperture,
+            face,
+            corners: unit_corners.iter().map(|&c| walls.warp.point(c)).collect(),
+            unit_corners,
             unit_eye,
             eye: walls.warp.point(unit_eye),
             world,
         }
     }
 
-    /// Radiosity of the walls (texels x signals) as that of the canonical emitter behind the opening, in the frame of
-    /// its heading or in that with x and y exchanged.
-    pub fn emitter_radiosity(&self, is_exchanged: bool, radiosity: &Matrix<f64>) -> Matrix<f64> {
+    /// Radiosity of the walls (texels x signals) carried over to the texels of [`EMITTER`], which takes the place of the
+    /// block behind the opening, in one of the frames there.
+    pub fn emitter_radiosity(&self, frame: PathFrame, radiosity: &Matrix<f64>) -> Matrix<f64> {
         let resolution = self.walls.resolution;
-        let frame = opening_frame(self.aperture.face, is_exchanged);
+        let frame = frame.of_heading(self.face);
         let texels: Vec<(Face, DVec3)> = EMITTER.texels(resolution).collect();
         let seen: Vec<Vec<(usize, f64)>> = texels
             .par_iter()
             .map(|&(face, center)| self.seen_behind(frame.face(face), frame.point(center)))
             .collect();
-        Matrix::from_fn(seen.len(), radiosity.columns(), |i, j| {
-            seen[i].iter().map(|&(k, w)| w * radiosity[(k, j)]).sum()
-        })
+        weighted_rows(&seen, radiosity)
     }
 
-    /// The texels that are seen in place of one of the unit cube, with their weights.
+    /// The texels, with weights, that are seen from the eye in place of a texel of the unit cube.
     fn seen_behind(&self, face: Face, center: DVec3) -> Vec<(usize, f64)> {
         let resolution = self.walls.resolution;
         let step = 1.0 / (resolution * RAYS) as f64;
@@ -119,7 +129,7 @@ impl<'a> OpeningView<'a> {
         seen
     }
 
-    /// The face that a ray from the eye ends on, and where in the unit cube.
+    /// The face that a ray from the eye ends on, and the end of the ray in the unit cube.
     fn end_of_ray(&self, direction: DVec3) -> Option<(Face, DVec3)> {
         let warp = &self.walls.warp;
         let inside = |s: f64| {
@@ -142,83 +152,45 @@ impl<'a> OpeningView<'a> {
         };
         Face::ALL
             .into_iter()
-            .filter(|&face| face != self.aperture.face)
+            .filter(|&face| face != self.face)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .map(|face| (face, unit))
     }
 
-    /// The response modes on the walls and at the probes, entering through the opening.
+    /// The response modes on the walls and at the probes, entering through the opening in one of the frames there.
     ///
     /// `canonical_vector` is their vector irradiance on the canonical shape (4 texels x modes), or has no rows.
-    pub fn response(
+    pub fn arriving_light(
         &self,
-        is_exchanged: bool,
+        frame: PathFrame,
         response: &ResponseBasis,
         probes: usize,
         canonical_vector: &Matrix<f64>,
-    ) -> ForeignLight {
+    ) -> ArrivingLight {
         let resolution = self.walls.resolution;
-        let face = self.aperture.face;
-        let mut frame = frame_of_heading(face.opposite());
-        if is_exchanged {
-            frame = frame.after(CubeSymmetry::exchange(0, 1));
-        }
-        let back = frame.inverse();
-        let portal = self
-            .aperture
-            .corners()
-            .into_iter()
-            .map(|corner| self.walls.warp.point(corner))
-            .collect::<Vec<_>>();
-        let canonical = self.aperture.corners();
+        let back = frame.of_heading(self.face.opposite()).inverse();
         let texels: Vec<(Face, DVec3)> = self.walls.unit_texels().collect();
         let received: Vec<Vec<(usize, f64)>> = (0..texels.len())
             .into_par_iter()
-            .map(|texel| {
-                let (wall, unit) = texels[texel];
-                if self.shape.is_in_hole(wall, unit) {
-                    return Vec::new();
-                }
-                let Some((there, point)) = self.wall_of_cube(self.walls.centers[texel]) else {
-                    return Vec::new();
-                };
-                let factor = point_to_polygon(point, -there.outward(), &canonical);
-                if factor < LEAST_FACTOR {
-                    return Vec::new();
-                }
-                let normal = self.walls.normals[texel];
-                let share = factor_above(self.walls.centers[texel], normal, &portal) / factor;
-                bilinear(back.face(there), back.point(point), resolution)
-                    .into_iter()
-                    .map(|(row, weight)| (row, share * weight))
-                    .collect()
-            })
+            .map(|texel| self.received(texel, texels[texel], back))
             .collect();
-        let basis = &response.basis;
-        let walls = Matrix::from_fn(received.len(), basis.columns(), |i, j| {
-            received[i].iter().map(|&(k, w)| w * basis[(k, j)]).sum()
-        });
-        let at_cube = response_at(self.shape, face, is_exchanged, response, resolution, probes).0;
+        let walls = weighted_rows(&received, &response.basis);
+        let arrival = Arrival::new(self.shape, self.face, frame, resolution);
+        let at_cube = arrival.outputs(response, probes);
         let samples = rows(&at_cube, texels.len()..at_cube.rows());
         let shares: Vec<f64> = texels
             .iter()
-            .zip(&self.walls.centers)
-            .zip(&self.walls.normals)
-            .map(|((&(wall, unit), &center), &normal)| {
-                let factor = if wall == face {
+            .enumerate()
+            .map(|(texel, &(wall, unit))| {
+                if wall == self.face {
                     0.0
                 } else {
-                    point_to_polygon(unit, -wall.outward(), &canonical)
-                };
-                if factor < LEAST_FACTOR {
-                    0.0
-                } else {
-                    factor_above(center, normal, &portal) / factor
+                    self.share_of_cube(texel, wall, unit).unwrap_or(0.0)
                 }
             })
             .collect();
-        ForeignLight {
-            field: stack(&walls, &self.turned_probes(&samples, probes, &portal)),
+        ArrivingLight {
+            outputs: stack(&[&walls, &self.turned_probes(&samples, probes)]),
             vector: Matrix::from_fn(
                 canonical_vector.rows(),
                 canonical_vector.columns(),
@@ -227,15 +199,49 @@ impl<'a> OpeningView<'a> {
         }
     }
 
+    /// The receiver's texels, with weights, whose light a texel gets. `back` leads from the shape's frame to the
+    /// receiver's.
+    fn received(
+        &self,
+        texel: usize,
+        (wall, unit): (Face, DVec3),
+        back: CubeSymmetry,
+    ) -> Vec<(usize, f64)> {
+        if self.shape.is_in_hole(wall, unit) {
+            return Vec::new();
+        }
+        let Some((face, point)) = self.wall_of_cube(self.walls.centers[texel]) else {
+            return Vec::new();
+        };
+        let Some(share) = self.share_of_cube(texel, face, point) else {
+            return Vec::new();
+        };
+        bilinear(back.face(face), back.point(point), self.walls.resolution)
+            .into_iter()
+            .map(|(row, weight)| (row, share * weight))
+            .collect()
+    }
+
+    /// Form factor of the opening on a texel, divided by the form factor of the cube's opening on a point of the cube's
+    /// wall; `None` where the latter is grazing.
+    fn share_of_cube(&self, texel: usize, face: Face, point: DVec3) -> Option<f64> {
+        let on_cube = point_to_polygon(point, -face.outward(), &self.unit_corners);
+        if on_cube < LEAST_FACTOR {
+            return None;
+        }
+        let (center, normal) = (self.walls.centers[texel], self.walls.normals[texel]);
+        Some(factor_above(center, normal, &self.corners) / on_cube)
+    }
+
     /// Samples of the cube's probes (26 a probe) with the opening's true solid angle, turned as the warp turns.
-    fn turned_probes(&self, samples: &Matrix<f64>, probes: usize, portal: &[DVec3]) -> Matrix<f64> {
+    fn turned_probes(&self, samples: &Matrix<f64>, probes: usize) -> Matrix<f64> {
         let convert = ProbeSamples::default();
         let mut light = convert.to_sh(samples, PROBE_WEIGHT);
-        let canonical = self.aperture.corners();
         let turns: Vec<(f64, Vec<Matrix<f64>>)> = probe_points(probes)
             .map(|unit| {
-                let there = polygon_moments(unit, &canonical).solid_angle;
-                let here = polygon_moments(self.walls.warp.point(unit), portal).solid_angle;
+                let there = polygon_moments(unit, &self.unit_corners).solid_angle;
+                let world = self.walls.warp.point(unit);
+                let here = polygon_moments(world, &self.corners).solid_angle;
                 let turn = rotation_part(&self.walls.warp.jacobian(unit), POLAR_STEPS);
                 (here / there, sh::rotation_matrices(3, &turn))
             })
@@ -253,10 +259,10 @@ impl<'a> OpeningView<'a> {
         convert.from_sh(&light, PROBE_WEIGHT)
     }
 
-    /// Where the ray from the eye through a point of the world meets the unit cube.
+    /// The wall and the point where the ray from the eye through a point of the world meets the unit cube.
     fn wall_of_cube(&self, point: DVec3) -> Option<(Face, DVec3)> {
         let direction = self.world.inverse() * (point - self.eye);
-        if direction.dot(self.aperture.face.outward()) >= 0.0 {
+        if direction.dot(self.face.outward()) >= 0.0 {
             return None;
         }
         let (face, reach) = Face::ALL
@@ -274,10 +280,14 @@ impl<'a> OpeningView<'a> {
     }
 }
 
-/// Form factors below this are grazing, and quotients of them rounding.
-const LEAST_FACTOR: f64 = 1e-9;
+/// Sums of a matrix's rows with weights: row i of the result has the rows and weights of `sums[i]`.
+fn weighted_rows(sums: &[Vec<(usize, f64)>], matrix: &Matrix<f64>) -> Matrix<f64> {
+    Matrix::from_fn(sums.len(), matrix.columns(), |i, j| {
+        sums[i].iter().map(|&(k, w)| w * matrix[(k, j)]).sum()
+    })
+}
 
-/// Form factor of a polygon, as far as it is above the point's horizon.
+/// Form factor of the part of a polygon that is above the point's horizon.
 fn factor_above(point: DVec3, normal: DVec3, polygon: &[DVec3]) -> f64 {
     let mut polygon = polygon.to_vec();
     let horizon = HalfSpace::through(point, normal);

@@ -1,4 +1,4 @@
-//! The modes of one shape, chosen for all that its light does: on its own walls, at its probes, and on the walls
+//! The modes of one canonical cube, chosen for all that its light does: on its own walls, at its probes, and on the walls
 //! of the blocks beyond its openings.
 //!
 //! The paper chooses them for the own walls alone (section 4.1). The light of a spot on a wall is spread wide in its
@@ -6,111 +6,90 @@
 //! one opening away, and these by 1.92.
 
 use crate::config::BakeConfig;
-use crate::modular::light_prior::cube::{ScaledBasis, direct_samples, enriched_prior, light_prior};
-use crate::modular::one_bounce::cube::{restrict_to_shape, wall_fraction};
-use crate::modular::outputs::cube::{OWN_PROBE_WEIGHT, ProbeSamples, probe_operator};
-use crate::modular::paths::emission::opening_frame;
-use crate::modular::paths::response::stacked;
-use crate::modular::paths::transport::{EMITTER, Gather, Signals, gather, texel_at};
-use crate::modular::surface::mirrors::{output_parity_classes, texel_parity_classes};
+use crate::matrix_parts::stack;
+use crate::modular::light_prior::basis::{ScaledBasis, light_prior};
+use crate::modular::light_prior::cube::{direct_samples, enriched_prior};
+use crate::modular::one_bounce::cube::restrict_to_shape;
+use crate::modular::outputs::cube::probe_operator;
+use crate::modular::outputs::probe_samples::{OWN_PROBE_WEIGHT, ProbeSamples};
+use crate::modular::paths::ends::{EMITTER, PathFrame};
+use crate::modular::paths::gather::{Signals, gather};
+use crate::modular::surface::mirrors::cube::{output_parity_classes, texel_parity_classes};
+use crate::modular::surface::output_grid::OutputGrid;
+use crate::modular::surface::walls::cube::{texel_at, wall_fraction};
 use crate::modular::transport::modes::{
-    BlockTransport, block_transport, fold_bounce, fold_operator,
+    BlockTransport, applied_to_class, block_transport, fold_bounce, fold_operator,
 };
-use crate::progress::Cancelled;
 use mrt_core::geometry::cube::Face;
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::linalg::parity::ParityClasses;
-use mrt_core::linalg::svd::symmetric_eigen;
+use mrt_core::linalg::parity_modes::{GramModes, gram_of_columns};
 use mrt_runtime::blocks::Shape;
 use mrt_runtime::low_level::level::shape::Outline;
 use mrt_runtime::low_level::modular::path::{Crossing, Word, hole_of};
-
-/// A shape's operators: as [`BlockTransport`], with modes chosen for all outputs.
-pub type ShapeTransport = BlockTransport;
 
 /// The light that goes straight on through an opening of some outline into the next block.
 #[derive(Clone, Debug)]
 pub struct Neighbour {
     outline: Outline,
-    /// Rows x texels of the emitter; products of its columns are those of the light on the walls beyond.
+    /// Rows x texels of the emitter. Two of its columns have the scalar product of the light that the two texels send to the
+    /// walls and the probes beyond.
     operator: Matrix<f64>,
 }
 
-/// Rows of [`Neighbour::operator`] whose singular values are below this fraction of the largest are left out.
+/// Rows of a neighbour's operator whose singular values are below this fraction of the largest are left out.
 const NEIGHBOUR_FLOOR: f64 = 1e-3;
 
-/// The operators through openings of all the given outlines, compressed to few rows.
-///
-/// # Errors
-/// [`Cancelled`].
-pub fn neighbours(config: &BakeConfig, outlines: &[Outline]) -> Result<Vec<Neighbour>, Cancelled> {
-    let setup = Gather {
-        resolution: config.resolution,
-        probes: config.outputs.probes,
+/// The light beyond openings of all the given outlines.
+pub fn neighbours(config: &BakeConfig, outlines: &[Outline]) -> Vec<Neighbour> {
+    let grid = OutputGrid {
         vector: false,
+        ..OutputGrid::of(config)
     };
     let classes = texel_parity_classes(&EMITTER, config.resolution);
-    Ok(outlines
+    outlines
         .iter()
         .map(|&outline| {
             let word = Word::default().then(Crossing {
                 heading: Face::PosZ,
                 hole: hole_of(outline),
             });
-            let light = stacked(
-                &gather(&word, Signals::EachTexel, &setup),
-                &ProbeSamples::default(),
-            );
+            let light = gather(&word, Signals::EachTexel, &grid);
+            let light = light.texels_and_samples(&ProbeSamples::default());
             Neighbour {
                 outline,
                 operator: compressed(&light, &classes),
             }
         })
-        .collect())
+        .collect()
 }
 
-/// Few rows with nearly the same scalar products between columns; each row has a parity.
+/// Few rows whose columns have nearly the same scalar products; each row has a parity.
 fn compressed(operator: &Matrix<f64>, classes: &ParityClasses) -> Matrix<f64> {
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for class in 0..classes.class_count() {
-        // Columns of the class: the operator applied to the class's unit signals.
-        let columns: Vec<Vec<f64>> = (0..classes.dimension(class))
-            .map(|k| {
-                let mut unit = vec![0.0; classes.dimension(class)];
-                unit[k] = 1.0;
-                crate::modular::transport::modes::multiply_sparse(
-                    operator,
-                    &classes.unfold(class, &unit),
-                )
-            })
-            .collect();
-        let columns = Matrix::from_columns(operator.rows(), &columns);
-        let gram = mrt_core::linalg::matrix::transpose_multiply(columns.view(), columns.view());
-        let (values, vectors) = symmetric_eigen(gram.view());
-        let floor = NEIGHBOUR_FLOOR * NEIGHBOUR_FLOOR * values.first().copied().unwrap_or(0.0);
-        for (k, &value) in values.iter().enumerate().take_while(|(_, v)| **v > floor) {
-            let row: Vec<f64> = vectors.column(k).iter().map(|x| x * value.sqrt()).collect();
-            kept.push(classes.unfold(class, &row));
+        let columns = applied_to_class(operator, classes, class, 1.0);
+        let modes = GramModes::of(&gram_of_columns(&columns));
+        let largest = modes.singular_values.first().copied().unwrap_or(0.0);
+        for (k, &value) in modes.singular_values.iter().enumerate() {
+            if value > NEIGHBOUR_FLOOR * largest {
+                let row: Vec<f64> = modes.vectors.column(k).iter().map(|x| x * value).collect();
+                kept.push(classes.unfold(class, &row));
+            }
         }
     }
     Matrix::from_columns(classes.point_count(), &kept).transposed()
 }
 
-/// Everything about one shape alone.
+/// The reduced transport of one shape, from F of the closed cube.
 pub fn shape_transport(
     shape: &Shape,
     closed: &Matrix<f64>,
     neighbours: &[Neighbour],
     config: &BakeConfig,
-) -> ShapeTransport {
+) -> BlockTransport {
     if shape.wall_count() == 0 {
-        return BlockTransport {
-            indirect_basis: Matrix::zeros(0, 0),
-            coefficients_from_direct: Matrix::zeros(0, 0),
-            implicit_lighting: Matrix::zeros(0, 0),
-            singular_values: Vec::new(),
-            dropped_energy: 0.0,
-        };
+        return BlockTransport::empty();
     }
     let classes = texel_parity_classes(shape, config.resolution);
     let bounce = restrict_to_shape(closed, shape, config.resolution);
@@ -139,79 +118,63 @@ fn folded_outputs(
     classes: &ParityClasses,
     config: &BakeConfig,
 ) -> Vec<Matrix<f64>> {
-    let (resolution, probes) = (config.resolution, config.outputs.probes);
-    let samples = ProbeSamples::default();
-    let at_probes = samples.from_sh(&probe_operator(shape, resolution, probes), OWN_PROBE_WEIGHT);
-    let volume = output_parity_classes(shape, resolution, probes);
-    let texels = classes.point_count();
-    let padded = Matrix::from_fn(texels + at_probes.rows(), texels, |i, j| {
-        i.checked_sub(texels).map_or(0.0, |i| at_probes[(i, j)])
-    });
-    let folded_probes = fold_operator(&padded, &volume, classes);
+    let folded_probes = folded_probes(shape, classes, config);
     let beyond: Vec<Matrix<f64>> = shape
         .openings
         .iter()
         .filter_map(|opening| {
             let neighbour = neighbours.iter().find(|n| n.outline == opening.outline)?;
-            Some(beyond_opening(shape, opening.face, neighbour, resolution))
+            let face = opening.face;
+            Some(beyond_opening(shape, face, neighbour, config.resolution))
         })
         .collect();
     let weight = config.coupling.beyond_weight;
     (0..classes.class_count())
         .map(|class| {
-            let mut rows: Vec<Matrix<f64>> =
-                vec![folded_bounce[class].clone(), folded_probes[class].clone()];
-            for operator in &beyond {
-                // Its rows have no parity of the shape's, and need none: radiosity of the class does.
-                let columns: Vec<Vec<f64>> = (0..classes.dimension(class))
-                    .map(|k| {
-                        let mut unit = vec![0.0; classes.dimension(class)];
-                        unit[k] = weight;
-                        crate::modular::transport::modes::multiply_sparse(
-                            operator,
-                            &classes.unfold(class, &unit),
-                        )
-                    })
-                    .collect();
-                rows.push(Matrix::from_columns(operator.rows(), &columns));
-            }
-            stack_all(&rows)
+            let beyond: Vec<Matrix<f64>> = beyond
+                .iter()
+                .map(|operator| applied_to_class(operator, classes, class, weight))
+                .collect();
+            let own = [&folded_bounce[class], &folded_probes[class]];
+            let all: Vec<&Matrix<f64>> = own.into_iter().chain(&beyond).collect();
+            stack(&all)
         })
         .collect()
 }
 
-/// The neighbour's operator on the texels of a shape.
+/// The weighted samples of the shape's probes from radiosity, by parity class.
+fn folded_probes(shape: &Shape, classes: &ParityClasses, config: &BakeConfig) -> Vec<Matrix<f64>> {
+    let (resolution, probes) = (config.resolution, config.outputs.probes);
+    let operator = probe_operator(shape, resolution, probes);
+    let at_probes = ProbeSamples::default().from_sh(&operator, OWN_PROBE_WEIGHT);
+    let outputs = output_parity_classes(shape, resolution, probes);
+    let texels = classes.point_count();
+    // The classes of the outputs begin with the texels, which get nothing here.
+    let padded = stack(&[&Matrix::zeros(texels, texels), &at_probes]);
+    fold_operator(&padded, &outputs, classes)
+}
+
+/// The neighbour's operator behind an opening of a shape: rows x texels of the shape.
 fn beyond_opening(
     shape: &Shape,
     opening: Face,
     neighbour: &Neighbour,
     resolution: usize,
 ) -> Matrix<f64> {
-    let back = opening_frame(opening, false).inverse();
-    let sources: Vec<Option<(usize, f64)>> = shape
+    let back = PathFrame::Upright.of_heading(opening).inverse();
+    let columns: Vec<Vec<f64>> = shape
         .texels(resolution)
         .map(|(face, center)| {
-            let texel = texel_at(&EMITTER, back.face(face), back.point(center), resolution)?;
-            Some((texel, wall_fraction(shape, face, center, resolution)))
+            let texel = texel_at(&EMITTER, back.face(face), back.point(center), resolution);
+            let fraction = wall_fraction(shape, face, center, resolution);
+            match texel {
+                None => vec![0.0; neighbour.operator.rows()],
+                Some(texel) => {
+                    let column = neighbour.operator.column(texel);
+                    column.iter().map(|x| fraction * x).collect()
+                }
+            }
         })
         .collect();
-    Matrix::from_fn(neighbour.operator.rows(), sources.len(), |i, j| {
-        sources[j].map_or(0.0, |(texel, fraction)| {
-            fraction * neighbour.operator[(i, texel)]
-        })
-    })
-}
-
-fn stack_all(parts: &[Matrix<f64>]) -> Matrix<f64> {
-    let columns = parts.first().map_or(0, Matrix::columns);
-    let all: Vec<Vec<f64>> = (0..columns)
-        .map(|j| {
-            parts
-                .iter()
-                .flat_map(|part| part.column(j))
-                .copied()
-                .collect()
-        })
-        .collect();
-    Matrix::from_columns(parts.iter().map(Matrix::rows).sum(), &all)
+    Matrix::from_columns(neighbour.operator.rows(), &columns)
 }

@@ -1,51 +1,51 @@
-//! The modes of one tube, chosen for the light on its own wall and on that of the tubes beyond its openings, as
+//! The modes of one tube, chosen for the light on its own wall and on the walls of the tubes beyond its openings, as
 //! [`crate::modular::transport::cube`] does for cubes. Everything counts by area ([`AreaWeights`]).
 
 use crate::config::BakeConfig;
-use crate::modular::light_prior::cube::{ScaledBasis, enriched_weighted_prior, light_prior};
-use crate::modular::light_prior::tube::{AreaWeights, tube_direct_samples};
-use crate::modular::one_bounce::tube::{
-    Parts, TubeTexel, tube_bounce, tube_parity_classes, tube_texels,
-};
-use crate::modular::paths::response::stack;
+use crate::matrix_parts::stack;
+use crate::modular::light_prior::basis::{ScaledBasis, WeightedTexels, enriched_prior};
+use crate::modular::light_prior::tube::tube_light_prior;
+use crate::modular::one_bounce::tube::{Parts, tube_bounce};
+use crate::modular::surface::area_weights::AreaWeights;
+use crate::modular::surface::mirrors::tube::tube_parity_classes;
+use crate::modular::surface::walls::tube::{TubeTexel, TubeWall};
 use crate::modular::transport::modes::{
-    BlockTransport, block_transport, fold_bounce, multiply_sparse,
+    BlockTransport, applied_to_class, block_transport, fold_bounce,
 };
 use crate::progress::{Cancelled, Progress};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::tube::{TUBE_RADIUS, TubeForm};
 use mrt_core::linalg::matrix::Matrix;
-use mrt_core::linalg::parity::ParityClasses;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Texels along a chart of the tube beyond, at most: it only says which modes matter there.
+/// Texels along a chart of the tube beyond an opening, at most. That tube only decides which modes matter.
 const BEYOND_RESOLUTION: usize = 12;
 
-/// Everything about one tube alone, in terms of plain texel values.
+/// The reduced transport of one tube, in terms of plain texel values.
 ///
 /// # Errors
-/// [`Cancelled`].
+/// [`Cancelled`], if the caller has asked to stop.
 pub fn tube_transport(
-    form: TubeForm,
+    wall: &TubeWall,
     config: &BakeConfig,
     progress: &Progress,
 ) -> Result<BlockTransport, Cancelled> {
-    let resolution = config.resolution;
-    let classes = tube_parity_classes(form, resolution);
-    let weights = AreaWeights::new(form, resolution);
-    let bounce = tube_bounce(form, resolution, Parts::STANDARD, progress)?;
+    let classes = tube_parity_classes(wall);
+    let weights = AreaWeights::of_tube(wall);
+    let bounce = tube_bounce(wall, Parts::STANDARD, progress)?;
     let folded = fold_bounce(&weights.weigh_operator(&bounce), &classes);
     progress.check()?;
-    let beyond = beyond_opening(form, resolution, config.coupling.beyond_weight, &weights);
+    let beyond = beyond_opening(wall, &weights, config.coupling.beyond_weight);
     let outputs: Vec<Matrix<f64>> = (0..classes.class_count())
         .into_par_iter()
-        .map(|class| stack(&folded[class], &of_class(&beyond, &classes, class)))
+        .map(|class| {
+            let beyond = applied_to_class(&beyond, &classes, class, 1.0);
+            stack(&[&folded[class], &beyond])
+        })
         .collect();
-    let prior = &config.prior;
-    let samples = tube_direct_samples(form, resolution, prior.lights_per_axis, prior.light_radius);
-    let prior = light_prior(&weights.weigh(&samples), &classes, config.prior.k_d);
+    let prior = tube_light_prior(wall, &weights, &classes, &config.prior);
     progress.check()?;
     let transport =
         |basis: &ScaledBasis| block_transport(&outputs, &folded, basis, &classes, config.modes);
@@ -53,72 +53,83 @@ pub fn tube_transport(
     let weighted = match &config.enrichment {
         None => plain,
         Some(enrichment) => {
-            let enriched = enriched_weighted_prior(
-                &prior,
-                &plain.indirect_basis,
-                form.charts().len(),
-                &weights.roots,
-                &classes,
-                enrichment,
-            );
+            let texels = WeightedTexels {
+                classes: &classes,
+                roots: &weights.roots,
+                wall_count: wall.form.charts().len(),
+            };
+            let enriched = enriched_prior(&prior, &plain.indirect_basis, &texels, enrichment);
             transport(&enriched.basis)
         }
     };
-    Ok(weights.unweigh_transport(weighted))
+    Ok(unweighed(&weights, weighted))
+}
+
+/// The operators in terms of plain texel values, from operators between signals weighted by area.
+fn unweighed(weights: &AreaWeights, weighted: BlockTransport) -> BlockTransport {
+    let coefficients = &weighted.coefficients_from_direct;
+    BlockTransport {
+        indirect_basis: weights.unweigh(&weighted.indirect_basis),
+        coefficients_from_direct: coefficients.scaled_columns(&weights.roots),
+        implicit_lighting: weights.unweigh(&weighted.implicit_lighting),
+        singular_values: weighted.singular_values,
+        dropped_energy: weighted.dropped_energy,
+    }
 }
 
 /// Light on the wall of a straight tube behind the first opening, rows x texels, weighted by area on both sides.
 ///
-/// The other opening is its mirror image, and in the coordinates of a parity class their products are the same: so
-/// the rows of one stand for both, with twice the weight.
-fn beyond_opening(
-    form: TubeForm,
-    resolution: usize,
-    weight: f64,
-    weights: &AreaWeights,
-) -> Matrix<f64> {
-    let opening = form.openings()[0];
-    let sources = tube_texels(form, resolution);
-    let mean = form.wall_area() / sources.len() as f64;
-    let receivers = tube_texels(TubeForm::Straight, resolution.min(BEYOND_RESOLUTION));
+/// The other opening is the mirror image of the first, and in the coordinates of a parity class both have the same
+/// scalar products. So the rows of one stand for both, with twice the weight.
+fn beyond_opening(wall: &TubeWall, weights: &AreaWeights, weight: f64) -> Matrix<f64> {
+    let opening = wall.form.openings()[0];
+    let mean = wall.form.wall_area() / wall.texels.len() as f64;
+    let resolution = wall.resolution.min(BEYOND_RESOLUTION);
+    let receivers = TubeWall::new(TubeForm::Straight, resolution).texels;
     let rows: Vec<Vec<f64>> = receivers
         .par_iter()
         .map(|receiver| {
-            let (point, normal) = beyond(opening, receiver);
+            let beyond = beyond(opening, receiver);
             let scale = weight * (2.0 * receiver.area / mean).sqrt();
-            sources
-                .iter()
-                .zip(&weights.roots)
-                .map(|(source, root)| scale * kernel(form, opening, point, normal, source) / root)
-                .collect()
+            let sources = wall.texels.iter().zip(&weights.roots);
+            let factors =
+                sources.map(|(source, root)| scale * kernel(wall.form, &beyond, source) / root);
+            factors.collect()
         })
         .collect();
-    Matrix::from_fn(rows.len(), sources.len(), |i, j| rows[i][j])
+    Matrix::from_fn(rows.len(), wall.texels.len(), |i, j| rows[i][j])
 }
 
-/// Position and normal of a straight tube's texel, the tube attached at a side opening.
-fn beyond(opening: Face, texel: &TubeTexel) -> (DVec3, DVec3) {
+/// A point on the wall of a tube beyond an opening.
+struct PointBeyond {
+    opening: Face,
+    position: DVec3,
+    normal: DVec3,
+}
+
+/// The centre of a straight tube's texel, with the tube attached at a side opening.
+fn beyond(opening: Face, texel: &TubeTexel) -> PointBeyond {
     let turn = |v: DVec3| match opening.axis() {
         0 => v,
         _ => DVec3::new(v.z, v.y, v.x),
     };
-    let step = opening.outward();
-    (
-        turn(texel.center.position) + step,
-        turn(texel.center.normal),
-    )
+    PointBeyond {
+        opening,
+        position: turn(texel.center.position) + opening.outward(),
+        normal: turn(texel.center.normal),
+    }
 }
 
 /// Irradiance at a point beyond the opening from unit radiosity of a texel, taken at its centre.
-fn kernel(form: TubeForm, opening: Face, point: DVec3, normal: DVec3, source: &TubeTexel) -> f64 {
+fn kernel(form: TubeForm, at: &PointBeyond, source: &TubeTexel) -> f64 {
     let from = source.center.position;
-    let offset = from - point;
-    let (here, there) = (normal.dot(offset), -source.center.normal.dot(offset));
+    let offset = from - at.position;
+    let (here, there) = (at.normal.dot(offset), -source.center.normal.dot(offset));
     if here <= 0.0 || there <= 0.0 {
         return 0.0;
     }
-    let (axis, middle) = (opening.axis(), opening.point(0.5, 0.5));
-    let crossing = point + offset * ((middle[axis] - point[axis]) / offset[axis]);
+    let (axis, middle) = (at.opening.axis(), at.opening.point(0.5, 0.5));
+    let crossing = at.position + offset * ((middle[axis] - at.position[axis]) / offset[axis]);
     if crossing.distance(middle) > TUBE_RADIUS || !form.segment_is_free(from, crossing) {
         return 0.0;
     }
@@ -126,31 +137,23 @@ fn kernel(form: TubeForm, opening: Face, point: DVec3, normal: DVec3, source: &T
     here * there / (squared * squared) * source.area / PI
 }
 
-/// An operator on texels, in the coordinates of a class of its columns.
-fn of_class(operator: &Matrix<f64>, classes: &ParityClasses, class: usize) -> Matrix<f64> {
-    let columns: Vec<Vec<f64>> = (0..classes.dimension(class))
-        .map(|k| {
-            let mut unit = vec![0.0; classes.dimension(class)];
-            unit[k] = 1.0;
-            multiply_sparse(operator, &classes.unfold(class, &unit))
-        })
-        .collect();
-    Matrix::from_columns(operator.rows(), &columns)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::PriorConfig;
+    use crate::matrix_parts::difference;
+    use crate::modular::light_prior::tube::{tube_irradiance, tube_prior_lights};
+    use mrt_core::linalg::matrix::{multiply, transpose_multiply};
 
     #[test]
     fn light_beyond_falls_off_as_between_rings() {
-        let resolution = 12;
-        let weights = AreaWeights::new(TubeForm::Straight, resolution);
-        let operator = beyond_opening(TubeForm::Straight, resolution, 1.0, &weights);
+        let wall = TubeWall::new(TubeForm::Straight, 12);
+        let weights = AreaWeights::of_tube(&wall);
+        let operator = beyond_opening(&wall, &weights, 1.0);
         let uniform = Matrix::from_fn(operator.columns(), 1, |_, _| 1.0);
-        let light = mrt_core::linalg::matrix::multiply(operator.view(), uniform.view());
+        let light = multiply(operator.view(), uniform.view());
         // Form factor from a point of the wall to all rings up to a distance x on one side, by the known density of
-        // a ring's, with s = x / 2R.
+        // a ring's form factor, with s = x / 2R.
         let cumulated = |x: f64| {
             let steps = 2000;
             let density = |x: f64| {
@@ -163,10 +166,7 @@ mod tests {
                 .map(|k| density((f64::from(k) + 0.5) * step) * step)
                 .sum::<f64>()
         };
-        for (receiver, found) in tube_texels(TubeForm::Straight, resolution)
-            .iter()
-            .zip(light.data())
-        {
+        for (receiver, found) in wall.texels.iter().zip(light.data()) {
             // The receiver's tube lies at x < 0, its texels mirrored.
             let x = 1.0 - receiver.center.position.x;
             let exact = cumulated(x + 1.0) - cumulated(x);
@@ -176,6 +176,55 @@ mod tests {
                 (found / 2f64.sqrt() - exact).abs() < 0.01,
                 "{x}: {found} {exact}"
             );
+        }
+    }
+
+    /// All modes hold F on the prior's light exactly, and few of them nearly.
+    #[test]
+    fn reduced_transport_projects_by_area() {
+        let wall = TubeWall::new(TubeForm::Bend, 8);
+        let classes = tube_parity_classes(&wall);
+        let weights = AreaWeights::of_tube(&wall);
+        let bounce =
+            tube_bounce(&wall, Parts::STANDARD, &Progress::silent()).expect("nobody cancels");
+        let config = PriorConfig {
+            lights_per_axis: 4,
+            ..PriorConfig::default()
+        };
+        let prior = tube_light_prior(&wall, &weights, &classes, &config);
+        let folded = fold_bounce(&weights.weigh_operator(&bounce), &classes);
+        let transport = |modes| {
+            let weighted = block_transport(&folded, &folded, &prior.basis, &classes, modes);
+            unweighed(&weights, weighted)
+        };
+        let lights = tube_prior_lights(wall.form, config.lights_per_axis);
+        let all = Matrix::from_fn(wall.texels.len(), lights.len(), |i, j| {
+            tube_irradiance(wall.form, &wall.texels[i], &lights[j], config.light_radius)
+        });
+        let exact = multiply(bounce.view(), all.view());
+        let norm = |m: &Matrix<f64>| weights.weigh(m).frobenius_norm();
+        let error = |transport: &BlockTransport| {
+            let b = multiply(transport.coefficients_from_direct.view(), all.view());
+            let found = multiply(transport.indirect_basis.view(), b.view());
+            norm(&difference(&found, &exact)) / norm(&exact)
+        };
+        assert!(error(&transport(usize::MAX)) < 1e-9);
+        let reduced = transport(32);
+        assert!(error(&reduced) < 0.02, "{}", error(&reduced));
+        // U_b = F L_imp, and its columns are orthogonal by area.
+        let made = multiply(bounce.view(), reduced.implicit_lighting.view());
+        let weighted = weights.weigh(&reduced.indirect_basis);
+        let gram = transpose_multiply(weighted.view(), weighted.view());
+        for j in 0..gram.columns() {
+            for i in 0..gram.rows() {
+                let s = reduced.singular_values[j];
+                let expected = if i == j { s * s } else { 0.0 };
+                let scale = s * reduced.singular_values[i];
+                assert!((gram[(i, j)] - expected).abs() < 1e-9 * scale);
+            }
+        }
+        for (a, b) in made.data().iter().zip(reduced.indirect_basis.data()) {
+            assert!((a - b).abs() < 1e-9 * reduced.singular_values[0]);
         }
     }
 }

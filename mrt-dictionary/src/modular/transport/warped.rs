@@ -1,21 +1,23 @@
 //! Reduced transport for a warped block (Loos et al. 2011, sections 6.2 and 8, figure 12), in three levels
 //! of rising quality and cost:
 //!
-//! 1. the canonical shape's operators as they are;
-//! 2. **re-gathered**: the canonical implicit lighting `L_imp` is placed on the warped walls, and whatever is
+//! 1. **canonical**: the canonical shape's operators as they are;
+//! 2. **re-gathered**: the canonical implicit lighting `L_imp` is placed on the warped walls, and what is
 //!    gathered from it is gathered anew there: `U = F_warped L_imp`. The paper calls this "U-vector scaled";
 //! 3. **rebuilt**: prior, F and decomposition on the warped walls ("both scaled").
 //!
-//! Between the last two lies the best fit of coefficients to re-gathered vectors. It needs operators of its
-//! own as a rebuild does, and gives 22 % where that gives 10 (a box 1:1:5), so it is not offered.
+//! A best fit of coefficients to re-gathered vectors would lie between the last two. It needs operators of its
+//! own as a rebuild does, and errs by 22 % where a rebuild errs by 10 (a box 1:1:5), so it is not offered.
 //!
-//! Texels of a warped block differ in area, and squared errors are to be counted by area. So decompositions
+//! Texels of a warped block differ in area, and squared errors are to count by area. So decompositions
 //! run on signals times the root of the texel's area. F between such signals is symmetric but for
 //! discretisation, and everything of [`crate::modular::transport::modes`] applies as it stands.
 
 use crate::config::Enrichment;
-use crate::modular::one_bounce::warped::WarpedWalls;
-use crate::modular::surface::warped_mirrors::warped_parity_classes;
+use crate::matrix_parts::{scaled, scaled_rows, side_by_side};
+use crate::modular::light_prior::basis::fold_all;
+use crate::modular::surface::mirrors::warped::warped_parity_classes;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use crate::modular::transport::modes::{BlockTransport, fold_bounce};
 use crate::parallel_products::parallel_multiply;
 use mrt_core::linalg::matrix::{Matrix, dot};
@@ -23,12 +25,12 @@ use mrt_core::linalg::parity::ParityClasses;
 use mrt_core::linalg::parity_modes::{ModeChoice, ParityMode, Snapshots, combined_columns};
 use rayon::prelude::*;
 
-/// What a rebuild is free to choose.
+/// Settings of a rebuild.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RebuildConfig {
-    /// Modes, at most; fewer where a multiplet would be cut.
+    /// Largest number of modes; fewer are kept where a multiplet would be cut.
     pub modes: usize,
-    /// Appendix A; `None` leaves the prior as it is.
+    /// Enrichment of the prior (appendix A); `None` leaves the prior as it is.
     pub enrichment: Option<Enrichment>,
 }
 
@@ -41,13 +43,13 @@ pub fn regathered(bounce: &Matrix<f64>, implicit_lighting: &Matrix<f64>) -> Matr
 /// The reduced operators of the warped walls themselves, from F and samples `L_d` of direct light
 /// ([`crate::modular::light_prior::warped::warped_direct_samples`]).
 ///
-/// The same steps as a bake's, with two shortcuts that change no result beyond rounding: the samples are
-/// used as they are, since a prior that keeps all its vectors spans the same, and only products of columns
-/// are decomposed (method of snapshots), which is good for modes down to 1e-6 of the
+/// The same steps as a bake's, with two shortcuts that change no result beyond rounding. The samples are
+/// used as they are, since a prior that keeps all its vectors spans the same space. And only products of columns
+/// are decomposed ([`Snapshots`]), which is good for modes down to 1e-6 of the
 /// first. `BlockTransport::dropped_energy` and `singular_values` count by area.
 ///
-/// Cost at 16² on two cores, F not included: 0.2 s for a box; without any symmetry 0.6 s for a closed block
-/// and at most 2 s for one with openings, whose prior has more lights.
+/// Cost at 16² on two cores, without that of F: 0.2 s for a box. Blocks without any symmetry take 0.6 s if they are
+/// closed, and at most 2 s with openings, because their prior has more lights.
 pub fn rebuilt(
     walls: &WarpedWalls,
     bounce: &Matrix<f64>,
@@ -55,50 +57,46 @@ pub fn rebuilt(
     config: &RebuildConfig,
 ) -> BlockTransport {
     let classes = warped_parity_classes(walls);
-    let roots = root_areas(walls);
+    let roots: Vec<f64> = walls.areas.iter().map(|area| area.sqrt()).collect();
     let symmetric = Matrix::from_fn(bounce.rows(), bounce.columns(), |i, j| {
         bounce[(i, j)] * (roots[i] / roots[j])
     });
     let folded = fold_bounce(&symmetric, &classes);
-    let samples = normalized(scaled_rows(samples, &roots), 1.0);
-    let samples = folded_columns(&classes, &samples);
-    let emitted: Vec<(Matrix<f64>, Matrix<f64>)> = folded
-        .iter()
-        .zip(samples)
-        .map(|(bounce, columns)| (parallel_multiply(bounce, &columns), columns))
-        .collect();
-    let Some(enrichment) = &config.enrichment else {
-        return assembled(&classes, &roots, &folded, &emitted, config.modes);
+    let decomposed = |prior: &[ImagedPrior]| {
+        let parts = Decomposed {
+            classes: &classes,
+            roots: &roots,
+            folded: &folded,
+            prior,
+        };
+        parts.transport(config.modes)
     };
-    let plain = assembled(&classes, &roots, &folded, &emitted, config.modes);
-    let joining = [
-        normalized(
-            scaled_rows(&wall_constants(walls, 1), &roots),
-            enrichment.uniform_weight,
-        ),
-        normalized(
-            scaled_rows(&wall_constants(walls, walls.faces.len()), &roots),
+    let samples = normalized(scaled_rows(samples, &roots), 1.0);
+    let prior: Vec<ImagedPrior> = folded
+        .iter()
+        .zip(fold_all(&classes, &samples))
+        .map(|(bounce, columns)| ImagedPrior::new(bounce, columns))
+        .collect();
+    let plain = decomposed(&prior);
+    let Some(enrichment) = &config.enrichment else {
+        return plain;
+    };
+    let weighted = |signals: &Matrix<f64>, weight| normalized(scaled_rows(signals, &roots), weight);
+    let joining = side_by_side(&[
+        &weighted(&wall_constants(walls, 1), enrichment.uniform_weight),
+        &weighted(
+            &wall_constants(walls, walls.faces.len()),
             enrichment.constant_weight,
         ),
-        normalized(
-            scaled_rows(&plain.indirect_basis, &roots),
-            enrichment.indirect_weight,
-        ),
-    ];
-    let joining = folded_columns(&classes, &side_by_side(&joining));
-    let enriched: Vec<(Matrix<f64>, Matrix<f64>)> = folded
+        &weighted(&plain.indirect_basis, enrichment.indirect_weight),
+    ]);
+    let enriched: Vec<ImagedPrior> = folded
         .iter()
-        .zip(&joining)
-        .zip(&emitted)
-        .map(|((bounce, joining), (images, columns))| {
-            let joined = parallel_multiply(bounce, joining);
-            (
-                side_by_side(&[images.clone(), joined]),
-                side_by_side(&[columns.clone(), joining.clone()]),
-            )
-        })
+        .zip(fold_all(&classes, &joining))
+        .zip(&prior)
+        .map(|((bounce, joining), prior)| prior.beside(ImagedPrior::new(bounce, joining)))
         .collect();
-    assembled(&classes, &roots, &folded, &enriched, config.modes)
+    decomposed(&enriched)
 }
 
 /// Functions that are constant on one wall, or (one column) on all of them.
@@ -109,104 +107,120 @@ fn wall_constants(walls: &WarpedWalls, columns: usize) -> Matrix<f64> {
     })
 }
 
-/// The largest modes over all classes, brought back to texels. `emitted` holds, for each class, F times
-/// the columns of the prior, and these columns.
-fn assembled(
-    classes: &ParityClasses,
-    roots: &[f64],
-    folded: &[Matrix<f64>],
-    emitted: &[(Matrix<f64>, Matrix<f64>)],
-    modes: usize,
-) -> BlockTransport {
-    let parts: Vec<Snapshots> = emitted
-        .par_iter()
-        .map(|(images, _)| Snapshots::of(images))
-        .collect();
-    let choice = ModeChoice::largest(parts.iter().map(Snapshots::singular_values), modes);
-    let columns: Vec<[Vec<f64>; 3]> = choice
-        .kept
-        .par_iter()
-        .map(|&ParityMode { class, position }| {
-            let sigma = parts[class].singular_values()[position];
-            let (images, prior) = &emitted[class];
-            let (u, v) = parts[class].pair(images, position);
-            let implicit = combined_columns(prior, &v);
-            let row: Vec<f64> = (0..folded[class].columns())
-                .map(|j| dot(folded[class].column(j), &u) / sigma)
-                .collect();
-            let scaled: Vec<f64> = u.iter().map(|x| x * sigma).collect();
-            let unweighted = |signal: Vec<f64>| {
-                let signal = classes.unfold(class, &signal);
-                signal.iter().zip(roots).map(|(x, r)| x / r).collect()
-            };
-            let row = classes.unfold(class, &row);
-            [
-                unweighted(scaled),
-                unweighted(implicit),
-                row.iter().zip(roots).map(|(x, r)| x * r).collect(),
-            ]
-        })
-        .collect();
-    let gather = |which: usize| {
-        let columns: Vec<&[f64]> = columns.iter().map(|c| c[which].as_slice()).collect();
-        Matrix::from_columns(classes.point_count(), &columns)
-    };
-    BlockTransport {
-        indirect_basis: gather(0),
-        implicit_lighting: gather(1),
-        coefficients_from_direct: gather(2).transposed(),
-        dropped_energy: choice.dropped_energy(),
-        singular_values: choice.singular_values,
-    }
-}
-
-fn root_areas(walls: &WarpedWalls) -> Vec<f64> {
-    walls.areas.iter().map(|area| area.sqrt()).collect()
-}
-
-fn scaled_rows(a: &Matrix<f64>, scales: &[f64]) -> Matrix<f64> {
-    Matrix::from_fn(a.rows(), a.columns(), |i, j| a[(i, j)] * scales[i])
-}
-
-/// Scaled to a Frobenius norm.
+/// Scaled to a Frobenius norm. A matrix of zeros stays as it is.
 fn normalized(a: Matrix<f64>, norm: f64) -> Matrix<f64> {
     let found = a.frobenius_norm();
-    // Samples of lights that light nothing.
     if found == 0.0 {
         return a;
     }
-    a.scaled_columns(&vec![norm / found; a.columns()])
+    scaled(&a, norm / found)
 }
 
-fn folded_columns(classes: &ParityClasses, signals: &Matrix<f64>) -> Vec<Matrix<f64>> {
-    (0..classes.class_count())
-        .into_par_iter()
-        .map(|class| classes.fold_columns(class, signals))
-        .collect()
+/// The part of a prior in one parity class, and what one bounce makes of it.
+struct ImagedPrior {
+    columns: Matrix<f64>,
+    /// F times the columns.
+    images: Matrix<f64>,
 }
 
-fn side_by_side(parts: &[Matrix<f64>]) -> Matrix<f64> {
-    let rows = parts.first().map_or(0, Matrix::rows);
-    let data: Vec<f64> = parts
-        .iter()
-        .flat_map(|m| m.data().iter().copied())
-        .collect();
-    Matrix::from_column_major(rows, data.len() / rows.max(1), data)
+impl ImagedPrior {
+    fn new(bounce: &Matrix<f64>, columns: Matrix<f64>) -> Self {
+        Self {
+            images: parallel_multiply(bounce, &columns),
+            columns,
+        }
+    }
+
+    fn beside(&self, other: Self) -> Self {
+        Self {
+            columns: side_by_side(&[&self.columns, &other.columns]),
+            images: side_by_side(&[&self.images, &other.images]),
+        }
+    }
+}
+
+/// What the modes of a rebuilt block are chosen from.
+struct Decomposed<'a> {
+    classes: &'a ParityClasses,
+    /// Roots of the texels' areas.
+    roots: &'a [f64],
+    /// F by parity class, between weighted signals.
+    folded: &'a [Matrix<f64>],
+    /// By parity class.
+    prior: &'a [ImagedPrior],
+}
+
+impl Decomposed<'_> {
+    /// The largest modes over all classes, brought back to plain texel values.
+    fn transport(&self, modes: usize) -> BlockTransport {
+        let parts: Vec<Snapshots> = self
+            .prior
+            .par_iter()
+            .map(|part| Snapshots::of(&part.images))
+            .collect();
+        let choice = ModeChoice::largest(parts.iter().map(Snapshots::singular_values), modes);
+        let found: Vec<TexelMode> = choice
+            .kept
+            .par_iter()
+            .map(|&mode| self.mode(&parts[mode.class], mode))
+            .collect();
+        let gather = |part: fn(&TexelMode) -> &[f64]| {
+            let columns: Vec<&[f64]> = found.iter().map(part).collect();
+            Matrix::from_columns(self.classes.point_count(), &columns)
+        };
+        BlockTransport {
+            indirect_basis: gather(|mode| &mode.indirect),
+            implicit_lighting: gather(|mode| &mode.implicit),
+            coefficients_from_direct: gather(|mode| &mode.from_direct).transposed(),
+            dropped_energy: choice.dropped_energy(),
+            singular_values: choice.singular_values,
+        }
+    }
+
+    fn mode(&self, part: &Snapshots, ParityMode { class, position }: ParityMode) -> TexelMode {
+        let (prior, bounce) = (&self.prior[class], &self.folded[class]);
+        let sigma = part.singular_values()[position];
+        let (u, v) = part.pair(&prior.images, position);
+        let implicit = combined_columns(&prior.columns, &v);
+        let row: Vec<f64> = (0..bounce.columns())
+            .map(|j| dot(bounce.column(j), &u) / sigma)
+            .collect();
+        let indirect: Vec<f64> = u.iter().map(|x| x * sigma).collect();
+        let unweighed = |signal: &[f64]| {
+            let signal = self.classes.unfold(class, signal);
+            signal.iter().zip(self.roots).map(|(x, r)| x / r).collect()
+        };
+        let row = self.classes.unfold(class, &row);
+        TexelMode {
+            indirect: unweighed(&indirect),
+            implicit: unweighed(&implicit),
+            from_direct: row.iter().zip(self.roots).map(|(x, r)| x * r).collect(),
+        }
+    }
+}
+
+/// One mode, by texel.
+struct TexelMode {
+    /// Column of `U_b`.
+    indirect: Vec<f64>,
+    /// Column of `L_imp`.
+    implicit: Vec<f64>,
+    /// Row of `T_d->b`.
+    from_direct: Vec<f64>,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::PriorConfig;
-    use crate::modular::light_prior::cube::{
-        direct_samples, enriched_prior, light_prior, prior_lights,
-    };
+    use crate::modular::light_prior::basis::light_prior;
+    use crate::modular::light_prior::cube::{direct_samples, enriched_prior, prior_lights};
     use crate::modular::light_prior::warped::{
         warped_direct_samples, warped_light_radius, warped_prior_lights,
     };
     use crate::modular::one_bounce::cube::{Reconstruction, closed_cube_bounce};
     use crate::modular::one_bounce::warped::warped_bounce;
-    use crate::modular::surface::mirrors::texel_parity_classes;
+    use crate::modular::surface::mirrors::cube::texel_parity_classes;
     use crate::modular::transport::modes::block_transport;
     use crate::progress::Progress;
     use glam::DVec3;
@@ -339,7 +353,7 @@ mod tests {
             ..config()
         };
         let found = rebuilt(&walls, &bounce, &samples, &many);
-        // Uniform light, with its weight of ten, comes first; its class was lost once.
+        // Uniform light, with its weight of ten, comes first, so its class must be there.
         assert!(found.singular_values[0] > 10.0);
         assert!(found.singular_values.iter().all(|s| s.is_finite()));
     }

@@ -1,6 +1,6 @@
-//! Which transport each block of a level needs: what its warp costs, measured, against what is accepted.
+//! Which transport each block of a level needs: the measured error of its warp against the error that is accepted.
 
-use crate::modular::one_bounce::warped::WarpedWalls;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use crate::modular::variants::build::VariantError;
 use crate::modular::variants::warp_error::{CanonicalOperators, WarpError, warp_error};
 use crate::progress::Progress;
@@ -12,24 +12,25 @@ use mrt_runtime::blocks::{Shape, WarpTransport};
 use mrt_runtime::low_level::level::warp_form::{WarpForm, form_of, same_form, warp_of};
 use mrt_runtime::{Dictionary, Level};
 
-/// What a block's light is expected to err by, by transport: the first bounce within the block, relative L2.
+/// Expected errors of a block's light: the first bounce within the block, relative L2 (0.1 is 10 %).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlockEstimate {
-    /// With each of [`WarpTransport::ALL`]. Rebuilding is taken to reach what the shape errs by as a cube; the table
-    /// of docs/WARPS.md has it measured.
+    /// The error with each of [`WarpTransport::ALL`]. A rebuilt block is assumed to err by as much as its shape does as a
+    /// cube; the table of docs/WARPS.md has measured errors.
     pub expected: [f64; 3],
-    /// Relative error of the mean irradiance, of the first two.
+    /// Relative error of the mean irradiance with the first two transports.
     pub expected_level: [f64; 2],
     /// Longest over shortest edge.
     pub stretch: f64,
 }
 
-/// Errors that a warp may add before a block gets better operators. They add to the shape's own as squares.
+/// Errors that a warp may add before a block gets better operators. Squares of errors add up: the shape's own and the
+/// warp's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thresholds {
-    /// Above this, canonical operators are re-gathered.
+    /// Canonical operators that err by more than this are re-gathered.
     pub regather: f64,
-    /// Where these err by more than this, they are rebuilt.
+    /// Where re-gathered operators err by more than this, they are rebuilt.
     pub rebuild: f64,
 }
 
@@ -43,7 +44,7 @@ impl Default for Thresholds {
 }
 
 impl BlockEstimate {
-    /// What the warp adds to the shape's own error.
+    /// The error that the warp adds to the shape's own.
     pub fn added(&self, transport: WarpTransport) -> f64 {
         let own = self.expected[WarpTransport::Rebuilt as usize];
         let found = self.expected[transport as usize];
@@ -62,7 +63,7 @@ impl BlockEstimate {
     }
 }
 
-/// Rows of a wall's texels between two that are measured: prime, so that it shares no factor with a resolution.
+/// Every seventh texel is measured: a prime, which shares no factor with the resolutions of the presets.
 const STRIDE: usize = 7;
 
 /// Estimates every block of a level; blocks of one form are measured once.
@@ -76,17 +77,16 @@ pub fn estimate_blocks(
     dictionary: &Dictionary,
     progress: &Progress,
 ) -> Result<Vec<BlockEstimate>, VariantError> {
-    let mut known: Vec<(&Shape, WarpForm, BlockEstimate)> = Vec::new();
+    let mut known: Vec<Known> = Vec::new();
+    // Errors of shapes that are not warped.
     let mut cubes: Vec<(&Shape, f64)> = Vec::new();
     let mut estimates = Vec::with_capacity(level.blocks.len());
     for (index, block) in level.blocks.iter().enumerate() {
         let shape = block.shape;
         let form = form_of(block);
-        let same = |(other, corners, _): &&(&Shape, WarpForm, BlockEstimate)| {
-            *other == shape && same_form(corners, &form)
-        };
-        if let Some((_, _, estimate)) = known.iter().find(same) {
-            estimates.push(*estimate);
+        let is_same = |other: &&Known| other.shape == shape && same_form(&other.form, &form);
+        if let Some(known) = known.iter().find(is_same) {
+            estimates.push(known.estimate);
             continue;
         }
         progress.step("measuring blocks", index, level.blocks.len())?;
@@ -105,12 +105,24 @@ pub fn estimate_blocks(
             expected_level: [found.reused_level, found.regathered_level],
             stretch: stretch(&block.warp),
         };
-        known.push((shape, form, estimate));
+        known.push(Known {
+            shape,
+            form,
+            estimate,
+        });
         estimates.push(estimate);
     }
     Ok(estimates)
 }
 
+/// The estimate of a shape and form that was measured already.
+struct Known {
+    shape: &'static Shape,
+    form: WarpForm,
+    estimate: BlockEstimate,
+}
+
+/// The error of a block's shape under a warp.
 fn measure(
     dictionary: &Dictionary,
     block: usize,
@@ -124,7 +136,7 @@ fn measure(
             shape: shape.name,
         })?;
     let entry = &dictionary.shapes[position];
-    // Round tubes are measured by nothing yet, and have canonical operators only.
+    // Round tubes have canonical operators only, so there is nothing to choose.
     if shape.wall_count() == 0 || shape.tube().is_some() {
         return Ok(WarpError {
             reused: 0.0,
@@ -151,7 +163,7 @@ fn measure(
     Ok(warp_error(&walls, &canonical, STRIDE))
 }
 
-/// Longest over shortest of the three mean edges.
+/// Longest over shortest of a block's three mean edges.
 pub fn stretch(warp: &Hexahedron) -> f64 {
     let jacobian = warp.jacobian(DVec3::splat(0.5));
     let lengths = [0, 1, 2].map(|axis| jacobian.col(axis).length());
@@ -176,7 +188,7 @@ mod tests {
         assert_eq!(advice(0.09, 0.06), WarpTransport::Canonical);
         assert_eq!(advice(0.3, 0.1), WarpTransport::Regathered);
         assert_eq!(advice(0.5, 0.2), WarpTransport::Rebuilt);
-        // Rounding may put a cube below itself.
+        // Rounding may make a cube err by less than itself.
         assert_eq!(advice(0.049, 0.05), WarpTransport::Canonical);
     }
 }

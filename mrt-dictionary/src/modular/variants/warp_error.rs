@@ -1,12 +1,13 @@
 //! What a block's warp costs, for a designer to see before choosing between reuse, re-gather and rebuild.
 //!
-//! [`warp_error`] measures: it lights the warped block with a few lights and compares the first bounce of each
-//! cheap level with F of the warped walls, on a scattered part of the texels. No formula stands behind it,
-//! so it holds for any warp. [`strain`] is a number from the corners alone, for a first guess as long as
+//! [`warp_error`] measures: it lights the warped block with a few lights and compares the first bounce of reuse and
+//! re-gather with F of the warped walls, on a scattered part of the texels. It assumes nothing about the warp,
+//! so it holds for any. [`strain`] is a number from the corners alone, for a first guess while
 //! a corner is dragged.
 
 use crate::modular::light_prior::warped::{warped_direct_samples, warped_light_radius};
-use crate::modular::one_bounce::warped::{WarpedWalls, warped_bounce_rows};
+use crate::modular::one_bounce::warped::warped_bounce_rows;
+use crate::modular::surface::walls::warped::WarpedWalls;
 use glam::DVec3;
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::{Matrix, dot, multiply, transpose_multiply};
@@ -26,24 +27,25 @@ pub struct CanonicalOperators<'a> {
 /// Expected errors of the first bounce in a warped block. Relative: 0.1 is 10 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WarpError {
-    /// L2 by area, canonical operators as they are.
+    /// L2 by area with unchanged canonical operators.
     pub reused: f64,
-    /// L2 by area, `U` gathered anew.
+    /// L2 by area with `U` gathered anew.
     pub regathered: f64,
-    /// Mean irradiance with canonical operators, less the true one, over the true one.
+    /// Mean irradiance with unchanged canonical operators, less the true mean, divided by the true mean.
     pub reused_level: f64,
     /// The same with `U` gathered anew.
     pub regathered_level: f64,
 }
 
-/// Lights that the estimate averages over: more change it by less than it means.
+/// Number of lights whose errors an estimate is the median of. More lights change the median by less than matters.
 pub const SAMPLE_LIGHTS: usize = 32;
-/// Nearest that a sample light comes to a wall, in the unit cube; nearer ones measure the texel grid.
+/// Smallest distance of a sample light from a wall, in the unit cube. Nearer lights would measure the texel grid.
 const LIGHT_MARGIN: f64 = 0.1;
-/// Radius of the sample lights, in the widths of [`warped_light_radius`].
+/// Radius of the sample lights, as [`warped_light_radius`] takes it.
 const LIGHT_RADIUS: f64 = 0.1;
 
-/// Measures the errors, on every `stride`-th texel (best prime to the resolution; 1 for all of them).
+/// Measures the errors, on every `stride`-th texel: 1 for all texels, and else best a number without a factor in common
+/// with the resolution.
 ///
 /// Medians over [`SAMPLE_LIGHTS`] lights inside the block. Cost: `1/stride` of [`warped_bounce_rows`] for all
 /// texels: at 16² and a stride of 7 about 0.03 s on two cores.
@@ -73,7 +75,7 @@ pub fn warp_error(walls: &WarpedWalls, canonical: &CanonicalOperators, stride: u
     }
 }
 
-/// An error from what was found, what is true, and the areas to weight by; the three have one length.
+/// An error from the found values, the true values and the areas that weight them; all three have one length.
 type Measure = fn(&[f64], &[f64], &[f64]) -> f64;
 
 /// Scattered positions in the unit cube, the same every time: Kronecker's sequence with the roots of
@@ -135,12 +137,12 @@ pub fn strain(warp: &Hexahedron) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// First guess at the error of canonical operators as they are, relative L2, from the corners alone:
-/// `tanh(strain / 2)`, what the warp adds to the operators' own error.
+/// First guess at the relative L2 error of unchanged canonical operators, from the corners alone:
+/// `tanh(strain / 2)`, which the warp adds to the operators' own error.
 ///
-/// Fitted by eye to the closed blocks of `tests/tests/warped_transport.rs`: within a quarter of what is
-/// measured there for boxes of all proportions and for shears, up to twice too high for towers that taper
-/// or twist. It knows nothing of openings: a block that is stretched so that these take more or less of
+/// Fitted by eye to the closed blocks of `tests/tests/modular/warped/transport.rs`: within a quarter of the error
+/// measured there for boxes of all proportions and for shears, and up to twice too high for towers that taper
+/// or twist. The guess ignores openings. A block that is stretched so that they take more or less of
 /// the light than in the cube errs by up to twice as much.
 pub fn guessed_error(warp: &Hexahedron) -> f64 {
     libm::tanh(0.5 * strain(warp))

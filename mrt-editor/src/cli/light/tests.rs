@@ -45,16 +45,7 @@ fn mapped_room() -> tempfile::TempDir {
 
 /// Luminance of each pixel of a picture, encoded as sRGB.
 fn luminances(path: &Path) -> Vec<u8> {
-    let file = fs::File::open(path).expect("a picture");
-    let decoder = png::Decoder::new(std::io::BufReader::new(file));
-    let mut reader = decoder.read_info().expect("a PNG");
-    let mut pixels = vec![0; reader.output_buffer_size().expect("a size")];
-    reader.next_frame(&mut pixels).expect("whole");
-    let luminance = |[r, g, b]: &[u8; 3]| {
-        let weighted = 2126 * u32::from(*r) + 7152 * u32::from(*g) + 722 * u32::from(*b);
-        (weighted / 10_000) as u8
-    };
-    pixels.as_chunks::<3>().0.iter().map(luminance).collect()
+    image::open(path).expect("a picture").to_luma8().into_raw()
 }
 
 #[test]

@@ -1,35 +1,35 @@
-//! The cone that a light shines in through a sequence of openings.
+//! The cone of light that passes a sequence of openings.
 //!
 //! Each opening's polygon is clipped by the cone (Sutherland and Hodgman, "Reentrant polygon clipping", CACM 1974), and
-//! the planes through the light and its remaining edges are the next cone.
+//! the planes through the light and the remaining edges bound the next cone.
 
 use crate::level::placed::{PlacedBlock, Portal};
 use crate::light::source::Light;
 use glam::{DVec3, Vec3};
 
-/// Planes of a beam, at most. Openings of four corners give four, and more where crooked ones overlap; round openings
-/// are beyond it.
+/// Most planes of a beam. Openings with four corners give four planes, and more where crooked openings overlap; round
+/// openings exceed it.
 pub const MAX_PLANES: usize = 16;
 
-/// Corners of an opening, at most: those of a tube's end.
+/// Most corners of an opening: a tube's end has these.
 const MAX_CORNERS: usize = 32;
 
-/// Corners of an opening after clipping by every plane: each cuts off one corner and leaves two.
+/// Most corners of an opening after clipping: each plane replaces one corner by two.
 const MAX_CLIPPED: usize = MAX_CORNERS + MAX_PLANES;
 
-/// A point this near to a plane, in sizes of the opening or block, is on it: a thousand roundings of its coordinates
-/// at [`FAR_LIMIT`](crate::level::block::FAR_LIMIT). A sliver of shadow or light of that width is below what `f32` texels
-/// resolve.
+/// Distance, in sizes of the opening or block, within which a point counts as on a plane: a thousand roundings of
+/// coordinates at [`FAR_LIMIT`](crate::level::error::FAR_LIMIT). Positions of texels in `f32` do not resolve a sliver
+/// of that width.
 pub(super) const ON_PLANE: f64 = 1e-9;
 
-/// Openings of which the light sees less than this share of the area are closed. It ends paths that only rounding
+/// An opening passes no light if the cone meets less than this share of its area. It ends paths that only rounding
 /// keeps open, such as those around an edge where four blocks meet.
 const SMALLEST_SHARE: f64 = 1e-10;
 
-/// A half-space: `p · normal + offset >= 0`, p from the trace's origin.
+/// A half-space: `p · normal + offset >= 0`, for p relative to the trace's origin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plane {
-    /// Of unit length.
+    /// Unit normal.
     pub(super) normal: DVec3,
     /// Metres.
     offset: f64,
@@ -46,12 +46,12 @@ impl Plane {
     }
 }
 
-/// The intersection of half-spaces that light is in.
+/// An intersection of half-spaces that contains the light.
 #[derive(Clone, Debug)]
 pub(super) struct Cone {
     planes: [Plane; MAX_PLANES],
     count: usize,
-    /// False if light is in a part of the cone only.
+    /// False if the light may fill only a part of the cone.
     pub(super) is_exact: bool,
 }
 
@@ -66,7 +66,7 @@ impl Cone {
         &self.planes[..self.count]
     }
 
-    /// Takes over another, without the planes that it does not use: most cones have few.
+    /// Same as a clone of `other`, but copies only the planes in use: most cones have few.
     pub(super) fn copy_from(&mut self, other: &Cone) {
         self.planes[..other.count].copy_from_slice(other.planes());
         (self.count, self.is_exact) = (other.count, other.is_exact);
@@ -82,29 +82,29 @@ impl Cone {
     }
 }
 
-/// The light, as the geometry sees it.
+/// The geometry of a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
-    /// Where coordinates start: the light, or the world's origin if it is at infinity.
+    /// Origin of coordinates: the light, or the world's origin for a light at infinity.
     pub(super) origin: DVec3,
-    /// To a light at infinity.
+    /// Unit vector to a light at infinity; `None` for other lights.
     pub(super) toward: Option<DVec3>,
     cone: Option<SpotCone>,
 }
 
-/// The directions that a spot shines in.
+/// The cone that a spot shines into.
 #[derive(Clone, Copy, Debug)]
 struct SpotCone {
-    /// Of unit length.
+    /// Unit vector along the axis.
     axis: DVec3,
-    /// Of the outer angle.
+    /// Sine and cosine of the outer angle.
     sine: f64,
     cosine: f64,
 }
 
 impl SpotCone {
-    /// At most the distance of a point from the cone, metres; negative inside. In the plane of axis and point, it is
-    /// the distance from the cone's side, continued beyond the light.
+    /// A lower bound of the distance of a point from the cone, metres; negative inside. It is the distance, in the
+    /// plane of axis and point, from the line along the cone's side.
     fn distance(&self, point: DVec3) -> f64 {
         let along = point.dot(self.axis);
         let across = (point - along * self.axis).length();
@@ -112,7 +112,7 @@ impl SpotCone {
     }
 }
 
-/// What [`narrowed`] works on; what was there before does not matter.
+/// Memory of [`Passing::narrow`]; earlier content does not matter.
 #[derive(Clone, Debug)]
 pub(super) struct Scratch {
     outline: Clipped,
@@ -128,92 +128,142 @@ impl Scratch {
     };
 }
 
-/// Puts what of a cone passes an opening into the block whose portal it is in `out`; false if nothing does. `depth`
-/// openings were passed before.
-pub(super) fn narrowed(
-    cone: &Cone,
-    source: &Source,
-    portal: &Portal,
-    depth: u32,
-    scratch: &mut Scratch,
-    out: &mut Cone,
-) -> bool {
-    let count = portal.corners.len();
-    if count > MAX_CORNERS {
-        out.copy_from(cone);
-        out.is_exact = false;
-        return true;
-    }
-    let corner = |k: usize| portal.corners[if k < count { k } else { k - count }] - source.origin;
-    let size = portal.outward.length().sqrt();
-    let slack = ON_PLANE * size;
-    let (mut outline, mut spare) = (&mut scratch.outline, &mut scratch.spare);
-    outline.count = 0;
-    for k in 0..count {
-        outline.push(corner(k), k as u8);
-    }
-    for (k, plane) in cone.planes().iter().enumerate() {
-        match outline.clip(plane, (count + k) as u8, slack, spare) {
-            None => return false,
-            Some(true) => std::mem::swap(&mut outline, &mut spare),
-            Some(false) => {}
-        }
-    }
-    if outline.area() <= SMALLEST_SHARE * size * size {
-        return false;
-    }
-    // On which side of each edge the corner after it is: inside all in the outline of a convex opening, as the light
-    // sees it.
-    let sides = &mut scratch.sides[..count];
-    let (mut is_front, mut is_back) = (false, false);
-    for (k, side) in sides.iter_mut().enumerate() {
-        *side = source.plane_through(corner(k), corner(k + 1));
-        let turn = side.at(corner(k + 2));
-        is_front |= turn > slack;
-        is_back |= turn < -slack;
-    }
-    // A light that stands in an opening of its own block, or beyond it by rounding, shines into the next.
-    if !is_front && (depth > 0 || source.toward.is_some()) {
-        return false;
-    }
-    let mut taken = 0u64;
-    for &edge in &outline.edges[..outline.count] {
-        taken |= 1 << edge;
-    }
-    if is_front && is_back {
-        // A bent opening that is not convex from here: the planes of edges that are clipped away still cut.
-        taken = u64::MAX;
-    }
-    (out.count, out.is_exact) = (0, cone.is_exact);
-    let planes = sides.iter().chain(cone.planes());
-    for (k, &plane) in planes.enumerate() {
-        if taken & (1 << k) != 0 && plane.normal != DVec3::ZERO {
-            out.push(plane);
-        }
-    }
-    // Light that grazes a bent opening can pass its outline and run against its direction, which receivers ask too.
-    let outward = portal.outward.normalize();
-    let lift = |&c: &DVec3| (c - portal.corners[0]).dot(outward).abs();
-    if portal.corners.iter().any(|c| lift(c) > slack) {
-        match source.toward {
-            None => out.push(Plane {
-                normal: -outward,
-                offset: 0.0,
-            }),
-            Some(toward) if toward.dot(outward) <= 0.0 => return false,
-            Some(_) => {}
-        }
-    }
-    true
+/// A cone of light at an opening that it may pass.
+pub(super) struct Passing<'a> {
+    pub(super) cone: &'a Cone,
+    pub(super) source: &'a Source,
+    /// The opening, as a portal of the block beyond it.
+    pub(super) portal: &'a Portal,
+    /// Number of openings passed before.
+    pub(super) depth: u32,
 }
 
-/// A polygon, from the trace's origin, whose edges know the planes that they are on.
+impl Passing<'_> {
+    /// Writes the part of the cone that passes the opening to `out`; false if no light passes.
+    pub(super) fn narrow(&self, scratch: &mut Scratch, out: &mut Cone) -> bool {
+        let count = self.portal.corners.len();
+        if count > MAX_CORNERS {
+            out.copy_from(self.cone);
+            out.is_exact = false;
+            return true;
+        }
+        let size = self.portal.outward.length().sqrt();
+        let slack = ON_PLANE * size;
+        // 1. Clip the opening by the cone.
+        let Some(outline) = self.clipped(slack, &mut scratch.outline, &mut scratch.spare) else {
+            return false;
+        };
+        if outline.area() <= SMALLEST_SHARE * size * size {
+            return false;
+        }
+        // 2. The planes through the light and the opening's edges.
+        let sides = &mut scratch.sides[..count];
+        let turns = self.find_sides(slack, sides);
+        // A light that stands in an opening of its own block, or beyond it by rounding, shines into the next block.
+        if !turns.has_front && (self.depth > 0 || self.source.toward.is_some()) {
+            return false;
+        }
+        // 3. The planes that bound the next cone.
+        let mut taken = 0u64;
+        for &edge in &outline.edges[..outline.count] {
+            taken |= 1 << edge;
+        }
+        if turns.has_front && turns.has_back {
+            // A bent opening that is not convex as the light sees it: the planes of edges that are clipped away still
+            // cut.
+            taken = u64::MAX;
+        }
+        (out.count, out.is_exact) = (0, self.cone.is_exact);
+        let planes = sides.iter().chain(self.cone.planes());
+        for (k, &plane) in planes.enumerate() {
+            if taken & (1 << k) != 0 && plane.normal != DVec3::ZERO {
+                out.push(plane);
+            }
+        }
+        self.leaves_outwards(slack, out)
+    }
+
+    /// Corner `k` of the opening, counted on around the loop, from the trace's origin.
+    fn corner(&self, k: usize) -> DVec3 {
+        let corners = &self.portal.corners;
+        let k = if k < corners.len() {
+            k
+        } else {
+            k - corners.len()
+        };
+        corners[k] - self.source.origin
+    }
+
+    /// The opening's polygon, clipped by the planes of the cone; `None` if nothing is left.
+    fn clipped<'s>(
+        &self,
+        slack: f64,
+        mut outline: &'s mut Clipped,
+        mut spare: &'s mut Clipped,
+    ) -> Option<&'s Clipped> {
+        let count = self.portal.corners.len();
+        outline.count = 0;
+        for k in 0..count {
+            outline.push(self.corner(k), k as u8);
+        }
+        for (k, plane) in self.cone.planes().iter().enumerate() {
+            if outline.clip(plane, (count + k) as u8, slack, spare)? {
+                std::mem::swap(&mut outline, &mut spare);
+            }
+        }
+        Some(outline)
+    }
+
+    /// Writes the plane of each edge, and tells on which sides of them the corners after the edges are. Where the light
+    /// sees a convex outline from its front, all are in front.
+    fn find_sides(&self, slack: f64, sides: &mut [Plane]) -> Turns {
+        let mut turns = Turns::default();
+        for (k, side) in sides.iter_mut().enumerate() {
+            *side = self
+                .source
+                .plane_through(self.corner(k), self.corner(k + 1));
+            let turn = side.at(self.corner(k + 2));
+            turns.has_front |= turn > slack;
+            turns.has_back |= turn < -slack;
+        }
+        turns
+    }
+
+    /// Keeps light that runs against a bent opening's direction out of the cone: it can graze such an opening and pass
+    /// its outline, and receivers refuse it too. False if no light is left.
+    fn leaves_outwards(&self, slack: f64, out: &mut Cone) -> bool {
+        let corners = &self.portal.corners;
+        let outward = self.portal.outward.normalize();
+        let lift = |&c: &DVec3| (c - corners[0]).dot(outward).abs();
+        if corners.iter().any(|c| lift(c) > slack) {
+            match self.source.toward {
+                None => out.push(Plane {
+                    normal: -outward,
+                    offset: 0.0,
+                }),
+                Some(toward) if toward.dot(outward) <= 0.0 => return false,
+                Some(_) => {}
+            }
+        }
+        true
+    }
+}
+
+/// On which sides of the planes of an opening's edges its corners are.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turns {
+    has_front: bool,
+    has_back: bool,
+}
+
+/// A polygon, relative to the trace's origin, with the plane that each edge is in.
 #[derive(Clone, Debug)]
 struct Clipped {
     corners: [DVec3; MAX_CLIPPED],
-    /// Of the edge from each corner to the next: an edge of the opening, or their number and a plane of the cone.
+    /// For the edge from each corner to the next: the index of an edge of the opening, or the number of those edges
+    /// plus the index of a plane of the cone.
     edges: [u8; MAX_CLIPPED],
-    /// From the plane that it was last clipped by.
+    /// Distance of each corner from the plane of the last clipping.
     distances: [f64; MAX_CLIPPED],
     count: usize,
 }
@@ -226,8 +276,8 @@ impl Clipped {
         count: 0,
     };
 
-    /// Drops what does not fit, as only a polygon that is not convex has so many corners; of such a one the edges
-    /// are not asked.
+    /// Drops corners beyond [`MAX_CLIPPED`]. Only polygons that are not convex have so many, and the edges of those are
+    /// not used.
     fn push(&mut self, corner: DVec3, edge: u8) {
         if self.count < MAX_CLIPPED {
             (self.corners[self.count], self.edges[self.count]) = (corner, edge);
@@ -235,8 +285,8 @@ impl Clipped {
         }
     }
 
-    /// Puts what is inside a plane, or outside by at most `slack` metres, in `out`; `None` if nothing is. False if
-    /// all is, and `out` is then left alone.
+    /// Writes the part of the polygon that is inside a plane, or outside by at most `slack` metres, to `out`. `None` if
+    /// no corner is inside; `Some(false)`, with `out` unchanged, if all are.
     fn clip(&mut self, plane: &Plane, edge: u8, slack: f64, out: &mut Self) -> Option<bool> {
         let mut inside = 0;
         let corners = &self.corners[..self.count];
@@ -271,7 +321,7 @@ impl Clipped {
         (out.count >= 3).then_some(true)
     }
 
-    /// Square metres, of the polygon laid flat.
+    /// Area of the polygon, square metres; for a bent polygon, the length of its vector area.
     fn area(&self) -> f64 {
         let corners = &self.corners[..self.count];
         let first = corners[0];
@@ -324,8 +374,8 @@ impl Source {
         }
     }
 
-    /// The plane through the light and an edge, with the light's part of the opening inside; one that keeps
-    /// everything if the light is on the edge's line.
+    /// The plane through the light and an edge, with the opening inside; [`Plane::NONE`], which everything is inside
+    /// of, if the light is on the line of the edge.
     fn plane_through(&self, from: DVec3, to: DVec3) -> Plane {
         let normal = match self.toward {
             None => to.cross(from),
@@ -336,17 +386,17 @@ impl Source {
         };
         let offset = match self.toward {
             None => 0.0,
-            // The same end of the edge from both sides, so that planes are equal to the bit.
+            // The blocks on both sides choose the same end of the edge, so that their planes are equal to the bit.
             Some(_) if from.to_array() < to.to_array() => -normal.dot(from),
             Some(_) => -normal.dot(to),
         };
         Plane { normal, offset }
     }
 
-    /// True if a spot's cone passes a block by, and so everything beyond it that light reaches through the block.
+    /// True if the cone of a spot misses a block. Its light then reaches nothing through that block.
     pub(super) fn misses(&self, block: &PlacedBlock) -> bool {
         let (low, high) = block.bounds;
-        // With a margin for angles that kernels round.
+        // A margin, since kernels round angles.
         let (center, radius) = (0.5 * (low + high), 0.501 * (high - low).length());
         self.cone
             .is_some_and(|cone| cone.distance(center - self.origin) > radius)

@@ -1,6 +1,7 @@
 //! A beam's light on the texels of its block, many texels at once.
 //!
-//! The formulas are those of [`irradiance`](crate::light::direct_light::irradiance) in `f32`, the angle from a spot's axis by a polynomial.
+//! The formulas are those of [`irradiance`](crate::light::direct_light::irradiance) in `f32`; a polynomial gives the
+//! angle from a spot's axis.
 
 use crate::light::beam::Beam;
 use crate::light::limits::MIN_RADIUS;
@@ -10,27 +11,30 @@ use glam::Vec3;
 use mrt_core::simd::{Kernel, Lanes, SimdLevel, WIDEST};
 use std::f32::consts::PI;
 
-/// Texels of a block, coordinate by coordinate, padded to a multiple of [`WIDEST`]. Padding has normals of zero, and
-/// any finite position.
+/// Texels of a block, coordinate by coordinate, padded to a multiple of [`WIDEST`]. Padding has zero normals and finite
+/// positions.
 #[derive(Clone, Copy, Debug)]
 pub struct TexelPlanes<'a> {
-    /// x, y and z of the positions in the world, metres.
+    /// x, y and z of the world positions, metres.
     pub positions: [&'a [f32]; 3],
     /// x, y and z of the unit normals into the block.
     pub normals: [&'a [f32]; 3],
 }
 
-/// Adds the irradiance, W/m², of one beam to `out`: red, green and blue, as long as the texels' slices. Padding
-/// gets exactly 0. The beam must not be [exact](Beam::exact).
+/// Adds the irradiance, W/m², of one beam to `out`: red, green and blue, as long as the slices of `texels`. Padding
+/// gets exactly
+/// 0. The beam must not be [exact](Beam::exact).
 ///
-/// At lit texels it is that of [`irradiance`](crate::light::direct_light::irradiance) within 1e-5 of it and, since cosines are rounded,
-/// 1e-6 of what the texel would get if it faced the light. Between the angles of a spot, the falloff is that of an
-/// angle within 2e-6 rad. A texel within 1e-15 m of a light's centre gets less, as it gets nothing at the centre.
+/// At lit texels, the result differs from [`irradiance`](crate::light::direct_light::irradiance) by a factor of at most
+/// 1 ± 1e-5 and, since cosines are rounded, by 1e-6 of the irradiance on a surface that faces the light. Between the
+/// angles of a spot, the falloff is that of an angle within 2e-6 rad. A texel within 1e-15 m of a light's centre gets
+/// too little; at the centre it gets nothing.
 ///
-/// Cost: 20 to 40 instructions for as many texels as the level has lanes, and 4 for each plane of the beam.
+/// Cost: 20 to 40 instructions for each group of texels that fills the lanes of `level`, and 4 for each plane of the
+/// beam.
 ///
 /// # Panics
-/// If the slices differ in length, or it is not a multiple of [`WIDEST`].
+/// If the slices differ in length, or if their length is not a multiple of [`WIDEST`].
 pub fn add_beam(
     level: SimdLevel,
     texels: &TexelPlanes<'_>,
@@ -89,15 +93,17 @@ pub fn add_beam(
     }
 }
 
-/// Radians between the angles of a spot whose edge is hard: as much as the polynomial resolves.
+/// Smallest difference, radians, between the angles of a spot: the polynomial resolves no less. A spot with a hard edge
+/// gets it.
 const NARROWEST: f32 = 1e-6;
 
-/// Distance, metres, at which directions from a light still have all their digits: its square is a normal number.
+/// Smallest distance, metres, at which directions from a light keep all their digits: its square is a normal number.
 const NEAREST: f32 = 1e-15;
 
-/// Irradiance on a texel per intensity (or irradiance of a light at infinity), unshadowed.
+/// A light whose irradiance on texels is computed without shadows.
 trait Unshadowed: Copy {
-    /// From the beam's origin to the texels, and their normals.
+    /// Irradiance on texels per intensity, or per irradiance of a light at infinity. `offset` leads from the beam's
+    /// origin to the texels.
     fn factor<L: Lanes>(self, l: L, offset: [L::V; 3], normal: [L::V; 3]) -> L::V;
 }
 
@@ -151,7 +157,7 @@ impl<S: Unshadowed> Kernel for AddBeam<'_, S> {
                 let across = dot(l, offset, splat3(l, Vec3::new(x, y, z)));
                 inside = l.min(inside, l.add(across, l.splat(w)));
             }
-            // Half of a beam's texels and more may be in shadow, and shading costs more than asking.
+            // Half of a beam's texels and more may be in shadow, and computing their light costs more than this test.
             if !planes.is_empty() && l.largest(inside) < 0.0 {
                 continue;
             }
@@ -181,7 +187,7 @@ impl Sphere {
         }
     }
 
-    /// The factor, and the distance.
+    /// The irradiance per intensity, and the distance from the light.
     #[inline(always)]
     fn at<L: Lanes>(self, l: L, offset: [L::V; 3], normal: [L::V; 3]) -> (L::V, L::V) {
         let squared = l.max(dot(l, offset, offset), l.splat(NEAREST * NEAREST));
@@ -211,7 +217,7 @@ impl Unshadowed for Spot {
             l.mul(offset[2], per_metre),
         ];
         let angle = angle_between(l, direction, splat3(l, self.axis));
-        // 1 at the inner angle and below, 0 at the outer one and beyond.
+        // t is 1 up to the inner angle, and 0 from the outer angle on.
         let past = l.mul(l.sub(angle, l.splat(self.inner)), l.splat(self.per_radian));
         let t = l.min(l.max(l.sub(l.splat(1.0), past), l.splat(0.0)), l.splat(1.0));
         let smooth = l.mul(l.mul(t, t), l.sub(l.splat(3.0), l.add(t, t)));
@@ -231,12 +237,12 @@ const ASIN: [f32; 8] = [
     0.112_620_25,
 ];
 
-/// Radians between unit vectors, within 2e-6 for small angles and large. It comes from the chord, which is twice
-/// the sine of half the angle: the cosine has no digits left near 0 and π.
+/// Angle between unit vectors, radians, within 2e-6 everywhere from 0 to π. It is computed from the chord, which is
+/// twice the sine of half the angle, because the cosine loses its digits near 0 and π.
 #[inline(always)]
 fn angle_between<L: Lanes>(l: L, a: [L::V; 3], b: [L::V; 3]) -> L::V {
     let (zero, two) = (l.splat(0.0), l.splat(2.0));
-    // 1 where the angle is at most a right one, else -1: the other vector is then turned around.
+    // 1 up to a right angle, else -1: the second vector is then reversed.
     let sign = l.sub(l.keep_where_ge(dot(l, a, b), zero, two), l.splat(1.0));
     let chord = [
         l.sub(a[0], l.mul(sign, b[0])),
@@ -293,7 +299,7 @@ mod tests {
             for k in 0..1000 {
                 let angles: [f64; 16] = std::array::from_fn(|i| {
                     let t = f64::from(16 * k + i as i32) / 15999.0;
-                    // Dense at both ends and in the middle, where the vector is turned around.
+                    // Dense at both ends, where the cosine has no digits.
                     std::f64::consts::PI * t * t * (3.0 - 2.0 * t)
                 });
                 let vectors =

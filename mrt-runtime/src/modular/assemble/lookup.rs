@@ -1,4 +1,4 @@
-//! Which operators of a dictionary a level uses.
+//! Finds the operators of a dictionary that a level uses.
 
 use crate::level::block::Level;
 use crate::level::warp_form::form_of;
@@ -7,7 +7,7 @@ use crate::modular::assemble::config::Coupling;
 use crate::modular::assemble::error::AssembleError;
 use crate::modular::dictionary::{Dictionary, ShapeOperators};
 
-/// The coupling asked for, or lightfields where the dictionary never had a table.
+/// The coupling `asked` for; lightfields instead of a table if the dictionary was baked without one.
 pub(crate) fn usable_coupling<M>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -22,7 +22,7 @@ pub(crate) fn usable_coupling<M>(
     Ok(Coupling::Lightfield)
 }
 
-/// The operators that the level uses, each once, and for each block which of them.
+/// The operators that the level uses, each once; and for each block, the index of its operators among them.
 pub(crate) fn used_operators<'a, M>(
     level: &Level,
     dictionary: &'a Dictionary<M>,

@@ -1,4 +1,4 @@
-//! Brings each block of a level to its canonical frame, and finds what lies beyond its openings.
+//! Brings each block of a level to its canonical frame, and finds its neighbours beyond its openings.
 
 use crate::level::block::{Level, Opening, corner_index};
 use crate::level::block_grid::BlockGrid;
@@ -18,7 +18,7 @@ use mrt_core::geometry::polar_decomposition::rotation_part;
 /// The blocks of a checked level in their canonical frames, with `dictionary.resolution`² texels a wall.
 ///
 /// # Errors
-/// [`AssembleError::RolledInterface`].
+/// [`AssembleError::RolledInterface`], if the dictionary does not support how two blocks are turned against each other.
 pub(crate) fn place_level<M>(
     level: &Level,
     dictionary: &Dictionary<M>,
@@ -71,7 +71,7 @@ pub(crate) fn place_level<M>(
     })
 }
 
-/// What modular transport adds to each block: which operators it uses, and its parts of the coefficients.
+/// Data of modular transport for each block: its operators, and its ranges of coefficients.
 pub(super) fn scene_blocks(
     level: &Level,
     used: &[&ShapeOperators<impl OperatorMatrix>],
@@ -89,7 +89,7 @@ pub(super) fn scene_blocks(
             joint: joint - joint_modes..joint,
             world_from_probe: match block.transport {
                 WarpTransport::Canonical => rotation_of(&block.canonical_warp()),
-                // A variant's probes have the level's axes, turned back by the orientation alone.
+                // Probes of a variant have the axes of the level, turned back by the orientation.
                 _ => rotation_matrix(block.orientation),
             },
         }
@@ -97,8 +97,7 @@ pub(super) fn scene_blocks(
     place.collect()
 }
 
-/// How the canonical cubes on both sides of a connection stand to each other, read off the corners that
-/// meet.
+/// What lies beyond a connected opening.
 fn crossing(
     level: &Level,
     dictionary: &Dictionary<impl Sized>,
@@ -108,57 +107,26 @@ fn crossing(
     let canonical_face =
         |end: Opening| level.blocks[end.block].orientation.inverse().face(end.face);
     let (face_here, face_there) = (canonical_face(here), canonical_face(there));
-    let warp_here = level.blocks[here.block].canonical_warp();
-    let warp_there = level.blocks[there.block].canonical_warp();
-    // The corner of this block's cube that coincides with a corner of the other's face.
-    let matching = |unit_there: DVec3| {
-        let world = warp_there.corners[corner_index(unit_there)];
-        face_here
-            .rectangle([0.0, 1.0], [0.0, 1.0])
-            .into_iter()
-            .min_by(|a, b| {
-                let distance =
-                    |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
-                distance(a).total_cmp(&distance(b))
-            })
-            .unwrap_or(unit_there)
-    };
-    let origin = matching(face_there.point(0.0, 0.0));
-    let images = [
-        (
-            face_there.u_axis(),
-            matching(face_there.point(1.0, 0.0)) - origin,
-        ),
-        (
-            face_there.v_axis(),
-            matching(face_there.point(0.0, 1.0)) - origin,
-        ),
-        (
-            face_there.axis(),
-            -face_here.outward() * face_there.outward()[face_there.axis()],
-        ),
-    ];
-    let image_of = |axis: usize| {
-        images
-            .iter()
-            .find(|(a, _)| *a == axis)
-            .and_then(|(_, d)| Face::ALL.into_iter().find(|face| face.outward() == *d))
-    };
-    let rotation = match (image_of(0), image_of(1)) {
-        (Some(x), Some(y)) => CubeRotation::from_images(x, y),
+    let images = images_of_axes(
+        (&level.blocks[here.block].canonical_warp(), face_here),
+        (&level.blocks[there.block].canonical_warp(), face_there),
+    );
+    let rotation = match images {
+        [Some(x), Some(y), _] => CubeRotation::from_images(x, y),
         _ => None,
     };
-    let up = image_of(1);
-    // Holes know which way is up, and so do dictionaries whose shapes open sideways only.
+    let up = images[1];
+    // +y must stay up for holes, and for dictionaries whose shapes open sideways only.
     let outline = level.blocks[here.block].shape.opening(face_here);
     let has_hole = outline.is_some_and(|opening| hole_of(opening.outline).is_some());
     let keeps_up = match up {
         Some(Face::PosY) => true,
-        // Half a turn is two mirrors; a dictionary of version 1 does not know its modes' parities.
+        // Half a turn is a product of two mirrors; dictionaries of version 1 do not have the parities of modes under
+        // both.
         Some(Face::NegY) => !has_hole && dictionary.knows_parities(),
         _ => dictionary.has_exchanges() && !has_hole,
     };
-    let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == image_of(2));
+    let proper = rotation.filter(|r| keeps_up && Some(r.face(Face::PosZ)) == images[2]);
     match proper {
         Some(here_from_there) => Ok(Beyond::Block {
             block: BlockIndex::new(there.block),
@@ -175,13 +143,43 @@ fn crossing(
     }
 }
 
-/// The rotation of canonical axes to the world's: the orthogonal matrix nearest to the warp's derivative in the
+/// Where +x, +y and +z of the canonical cube there point in the canonical cube here, read off the corners that meet in
+/// the joined faces. `None` for an axis that has no single direction.
+fn images_of_axes(
+    (warp_here, face_here): (&Hexahedron, Face),
+    (warp_there, face_there): (&Hexahedron, Face),
+) -> [Option<Face>; 3] {
+    // The corner of the face here that is nearest to a corner of the face there.
+    let matching = |unit_there: DVec3| {
+        let world = warp_there.corners[corner_index(unit_there)];
+        let distance = |unit: &DVec3| warp_here.corners[corner_index(*unit)].distance(world);
+        face_here
+            .rectangle([0.0, 1.0], [0.0, 1.0])
+            .into_iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .unwrap_or(unit_there)
+    };
+    let face_along = |direction: DVec3| {
+        let mut faces = Face::ALL.into_iter();
+        faces.find(|face| face.outward() == direction)
+    };
+    let origin = matching(face_there.point(0.0, 0.0));
+    let axis = face_there.axis();
+    let mut images = [None; 3];
+    images[face_there.u_axis()] = face_along(matching(face_there.point(1.0, 0.0)) - origin);
+    images[face_there.v_axis()] = face_along(matching(face_there.point(0.0, 1.0)) - origin);
+    images[axis] = face_along(-face_here.outward() * face_there.outward()[axis]);
+    images
+}
+
+/// The rotation from canonical axes to world axes: the orthogonal matrix nearest to the derivative of the warp at its
 /// middle, by Newton's iteration for the polar decomposition (Higham 1986).
 fn rotation_of(warp: &Hexahedron) -> DMat3 {
     rotation_part(&warp.jacobian(DVec3::splat(0.5)), POLAR_STEPS)
 }
 
-/// Steps of the polar decomposition: warps that pass the level's check are stretched by up to 1e6.
+/// Steps of the polar decomposition: enough for warps that are stretched by 1e6, the most that the check of a level
+/// accepts.
 const POLAR_STEPS: usize = 40;
 
 fn rotation_matrix(rotation: CubeRotation) -> DMat3 {

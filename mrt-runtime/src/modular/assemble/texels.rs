@@ -1,4 +1,4 @@
-//! Where frames keep texels and coefficients, and where each texel is.
+//! Layouts of texels and coefficients in frames, and the positions, normals and areas of texels.
 
 use crate::level::block::Level;
 use crate::level::block_index::BlockIndex;
@@ -13,8 +13,8 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::simd::WIDEST;
 use mrt_core::simd::rows::DOT_ROWS;
 
-/// Areas of a warped block's texels over the mean of its openings' (of all its texels' where it has none), in texels:
-/// light that crosses an opening then counts as much on both sides.
+/// Areas of the texels of a warped block, in units of the mean area of a texel in its openings, so that light that
+/// crosses an opening counts the same on both sides. Without openings, the unit is the mean area of all texels.
 fn warped_areas(block: &PlacedBlock, resolution: usize) -> Vec<f32> {
     let area = |face: Face, unit: DVec3| {
         let jacobian = block.warp.jacobian(unit);
@@ -41,7 +41,7 @@ fn warped_areas(block: &PlacedBlock, resolution: usize) -> Vec<f32> {
     areas.iter().map(|area| (area / mean) as f32).collect()
 }
 
-/// Areas of the texels of each shape; none where all are 1.
+/// Areas of the texels of each shape; empty if all are 1.
 pub(super) fn shape_areas(
     level: &Level,
     placed: &PlacedLevel,
@@ -62,7 +62,7 @@ pub(super) fn shape_areas(
     areas
 }
 
-/// Blocks sorted by shape, and where each one's texels begin.
+/// The order of blocks, by shape, and the slots of their texels.
 pub(super) fn texel_layout(blocks: &[SceneBlock], shapes: &[PackedShape]) -> TexelLayout {
     let shape_of = |block: BlockIndex| blocks[block.get()].shape_index;
     let mut order: Vec<BlockIndex> = (0..blocks.len()).map(BlockIndex::new).collect();
@@ -87,12 +87,12 @@ pub(super) fn texel_layout(blocks: &[SceneBlock], shapes: &[PackedShape]) -> Tex
     }
 }
 
-/// Rows of coefficients that every block has room for.
+/// The layout of coefficients, with room for the rows of every shape.
 pub(super) fn coefficient_layout(shapes: &[PackedShape]) -> CoefficientLayout {
     let most = shapes.iter().map(|shape| shape.rows).max().unwrap_or(0);
     let rows = |shape: &PackedShape| shape.row_of_mode[..shape.modes].to_vec();
     CoefficientLayout {
-        // Kernels write groups of rows, and the last group may have one row only.
+        // Kernels write whole groups of rows, and the last group may have only one row in use.
         count: (most + DOT_ROWS - 1).next_multiple_of(WIDEST),
         row_of_mode: shapes.iter().map(rows).collect(),
     }
@@ -110,7 +110,7 @@ pub(super) fn texel_geometry(level: &PlacedLevel, layout: &TexelLayout) -> Texel
         let texel_of_slot = &layout.texel_of_slot[layout.shape(rank)];
         for (slot, &texel) in layout.slots(rank).zip(texel_of_slot) {
             let Some(&(face, unit)) = texels.get(texel as usize) else {
-                // A slot without a texel stands in the middle and, without a normal, gets no light.
+                // A slot without a texel gets a position in the block, and no light since its normal is 0.
                 let middle = placed.warp.center().as_vec3();
                 geometry.positions.set(slot, middle);
                 continue;

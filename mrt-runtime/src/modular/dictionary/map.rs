@@ -1,4 +1,4 @@
-//! A dictionary with every matrix replaced.
+//! Replaces every matrix of a dictionary.
 
 use crate::modular::dictionary::operator::OperatorKind;
 use crate::modular::dictionary::types::{
@@ -6,7 +6,7 @@ use crate::modular::dictionary::types::{
     Sources, Variant,
 };
 
-/// Every matrix replaced by what `f` makes of it.
+/// The dictionary with every matrix replaced by the result of `f`.
 pub(super) fn map<'s, M, N>(
     dictionary: &'s Dictionary<M>,
     f: &mut impl FnMut(OperatorKind, &'s M) -> N,
@@ -53,7 +53,7 @@ pub(super) fn map<'s, M, N>(
     }
 }
 
-/// [`map`] of the lightfields alone.
+/// Same as [`map`], for the lightfield operators only.
 pub(super) fn map_lightfields<'s, M, N>(
     fields: &'s LightfieldOperators<M>,
     f: &mut impl FnMut(OperatorKind, &'s M) -> N,

@@ -1,20 +1,20 @@
-//! What a matrix of a dictionary is: which operator, which lines of it are modes, and how it may be held.
+//! The matrices of a dictionary: which operator each is, whether its rows or columns are modes, and how it is stored.
 
 use mrt_core::linalg::matrix::Matrix;
 use mrt_core::storage::{ModeAxis, Storage, StoredMatrix};
 use std::borrow::Cow;
 
-/// A matrix of a dictionary, as `f32` or as a file stores it.
+/// A matrix of a dictionary: as `f32`, or as a file stores it.
 pub trait OperatorMatrix: Clone {
     /// Number of rows.
     fn rows(&self) -> usize;
     /// Number of columns.
     fn columns(&self) -> usize;
-    /// Bytes that it takes, scales included.
+    /// Bytes of the matrix, scales included.
     fn bytes(&self) -> usize;
-    /// As `f32`; borrowed if it is that already.
+    /// The matrix as `f32`; borrowed if it is `f32` already.
     fn decode(&self) -> Cow<'_, Matrix<f32>>;
-    /// As stored; `modes` is only asked of matrices that have no scales yet.
+    /// The matrix as a file stores it. `modes` matters only for matrices without scales.
     fn as_stored(&self, modes: ModeAxis) -> StoredMatrix<'_>;
     /// A matrix without elements.
     ///
@@ -99,7 +99,7 @@ pub enum OperatorKind {
 }
 
 impl OperatorKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [OperatorKind; 11] = [
         OperatorKind::CoefficientsFromDirect,
         OperatorKind::JointBasis,
@@ -114,7 +114,7 @@ impl OperatorKind {
         OperatorKind::ResponseSource,
     ];
 
-    /// For tables.
+    /// A short name, for tables.
     pub const fn name(self) -> &'static str {
         match self {
             OperatorKind::CoefficientsFromDirect => "T_d->b",
@@ -131,9 +131,9 @@ impl OperatorKind {
         }
     }
 
-    /// Which lines share a scale: columns of bases, rows of operators that give coefficients. What a shape emits
-    /// counts as a basis: scales an emission mode would let errors of the strong modes reach the weak ones, which are
-    /// those that get far (2.4 % of the light against 0.05 %, in `int8`).
+    /// Which lines are modes and have a scale each: columns of bases, rows of operators that give coefficients. The
+    /// emission of a shape counts as a basis. With one scale for each emission mode instead, errors of strong modes
+    /// would reach the weak ones, whose light gets far: an error of light of 2.4 % instead of 0.05 %, in `int8`.
     pub const fn modes(self) -> ModeAxis {
         match self {
             OperatorKind::JointBasis
@@ -146,13 +146,13 @@ impl OperatorKind {
         }
     }
 
-    /// How matrices of this kind are stored in a dictionary that is to be stored as `storage`: as it says, but for
-    /// small kinds that are worth more bytes.
+    /// The number format of matrices of this kind in a dictionary with format `storage`: the same, except that small
+    /// kinds with large errors get a more exact one.
     ///
-    /// Chosen by the error of light: relative L2 of indirect irradiance over a level, the worst of four light sets on
-    /// four levels (maze, corridor, cube, room) with one and with four bounces:
+    /// It was chosen by the error of light: relative L2 of indirect irradiance over a level, the worst of four light
+    /// sets on four levels (maze, corridor, cube, room) with one and with four bounces:
     ///
-    /// | stored so, the rest `f32` | `f16`: mobile, standard | `int8`: mobile, standard | share of bytes |
+    /// | kind in this format, the rest `f32` | `f16`: mobile, standard | `int8`: mobile, standard | share of bytes |
     /// | --- | --- | --- | --- |
     /// | bases | 0.026 %, 0.024 % | 0.39 %, 0.45 % | 20 % |
     /// | `T_d->b` | 0.012 %, 0.003 % | 0.20 %, 0.13 % | 14 % |
@@ -161,9 +161,10 @@ impl OperatorKind {
     /// | paths | 0.004 %, 0.006 % | 0.09 %, 0.09 % | 14 % |
     /// | all | 0.034 %, 0.029 % | 0.50 %, 0.49 % | |
     ///
-    /// Light is to be within 0.03 % with `f16` and within 0.5 % with `int8`. Responses and emission cost the least for
-    /// what they err, so they are stored one step more exactly. So are lightfields beside `f16`, since they are multiplied once an
-    /// opening: with them at `f16` the preset mobile errs by 0.03 %.
+    /// The error of light should be at most 0.03 % with `f16` and 0.5 % with `int8`. Responses and emission have the
+    /// fewest bytes for their error, so they are stored one step more exactly. So are lightfields in `f16`
+    /// dictionaries, since they are multiplied once for each opening: with lightfields in `f16`, the error of the
+    /// preset mobile is 0.03 %.
     pub const fn storage(self, storage: Storage) -> Storage {
         match (self, storage) {
             (

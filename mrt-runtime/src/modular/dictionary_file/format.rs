@@ -1,12 +1,14 @@
-//! Limits and errors of dictionary files, and what every version of them is read by.
+//! Limits and errors of dictionary files, and readers that all versions share.
 
 use crate::level::shape::{SHAPES, Shape};
+use crate::modular::dictionary::OperatorKind;
 use mrt_core::container::{ByteBudget, Container, ContainerError, Format};
+use mrt_core::storage::{StoredMatrix, StoredSection, read_stored};
 
-/// Version that is written, and the newest that is read.
+/// The version that is written, and the newest that is read.
 pub const DICTIONARY_VERSION: u32 = 2;
 
-/// Bytes that reading a dictionary may allocate by default.
+/// Default limit of the bytes that reading a dictionary allocates.
 pub const DEFAULT_BYTE_BUDGET: u64 = 1 << 30;
 
 /// Largest accepted resolution, texels along an edge of a wall.
@@ -18,7 +20,7 @@ pub const MAX_PROBES: usize = 16;
 /// Largest accepted number of modes of any kind.
 pub const MAX_MODES: usize = 4096;
 
-/// Most variants of shapes in a dictionary.
+/// Largest accepted number of variants.
 pub const MAX_VARIANTS: usize = 512;
 
 pub(super) const FORMAT: Format = Format {
@@ -31,100 +33,119 @@ pub(super) const FORMAT: Format = Format {
 /// Why bytes are not a dictionary.
 #[derive(Debug, thiserror::Error)]
 pub enum DictionaryError {
-    /// The container is at fault, or the file system.
+    /// The container is malformed, or the file could not be read.
     #[error(transparent)]
     Container(#[from] ContainerError),
-    /// A size is out of range.
+    /// A size is out of its range.
     #[error("dictionary: {what} is {found}; expected {low} to {limit}")]
     Size {
         /// Which size.
         what: &'static str,
-        /// Smallest accepted.
+        /// Smallest size accepted.
         low: usize,
-        /// Largest accepted.
+        /// Largest size accepted.
         limit: usize,
         /// The size in the file.
         found: usize,
     },
-    /// A section's length does not follow from the sizes.
+    /// The length of a section does not match the sizes.
     #[error("dictionary: section `{section}` has {found} numbers; expected {expected}")]
     Length {
         /// Which section.
         section: String,
-        /// Numbers that the sizes ask for.
+        /// Number of numbers by the sizes.
         expected: usize,
-        /// Numbers in the section.
+        /// Number of numbers in the section.
         found: usize,
     },
-    /// Not a path, or not in its place.
+    /// A word is not canonical, or not in ascending order.
     #[error(
         "dictionary: word {index} is `{found}`; expected canonical words, each once, ascending"
     )]
     Word {
-        /// Its position.
+        /// Position of the word.
         index: usize,
-        /// Its text.
+        /// Text of the word.
         found: String,
     },
-    /// A parity is not one of the four.
+    /// A parity is not in 0 to 3.
     #[error("dictionary: section `{section}` holds {found}; expected 0 to 3")]
     Parity {
         /// Which section.
         section: String,
-        /// The value there.
+        /// The value found.
         found: u16,
     },
-    /// A shape that this release does not know.
+    /// A shape is unknown to this release.
     #[error("dictionary: shape {index} is `{found}`; expected one of {expected}")]
     UnknownShape {
-        /// Which entry.
+        /// Position of the entry.
         index: usize,
-        /// Names of all shapes.
+        /// Names of all known shapes.
         expected: String,
         /// The name in the file.
         found: String,
     },
-    /// The same shape twice.
+    /// A shape is there twice.
     #[error("dictionary: shape `{found}` is there twice; expected once")]
     ShapeTwice {
-        /// Its name.
+        /// Name of the shape.
         found: &'static str,
     },
-    /// Not a variant of a shape.
+    /// The name of a variant does not give a shape of the dictionary and a transport.
     #[error(
         "dictionary: variant {index} is `{found}`; expected the name of a shape of the dictionary, a colon, and \
          canonical, regathered or rebuilt"
     )]
     Variant {
-        /// Which entry.
+        /// Position of the entry.
         index: usize,
-        /// Its text.
+        /// Text of the entry.
         found: String,
     },
-    /// A turn to the right, in a file of version 1, that no mirror makes of the turn to the left.
+    /// In a file of version 1, the turn to the right is not the mirror image of the turn to the left.
     #[error(
         "dictionary: element ({row}, {column}) of section `right` is {found}; expected {expected}, as in `left` \
          with the signs of odd modes changed"
     )]
     NotMirrored {
-        /// Its row.
+        /// Row of the element.
         row: usize,
-        /// Its column.
+        /// Column of the element.
         column: usize,
-        /// What the mirror makes of the element of `left`.
+        /// The element of `left`, with the sign that the mirror gives it.
         expected: f32,
-        /// What is there.
+        /// The element of `right`.
         found: f32,
     },
 }
 
-/// A container with what may still be allocated.
+/// A container, and the bytes that may still be allocated.
 pub(super) struct Source<'a, 'c, 'b> {
     pub container: &'c Container<'a>,
     pub budget: &'b mut ByteBudget,
 }
 
-impl Source<'_, '_, '_> {
+impl<'a> Source<'a, '_, '_> {
+    /// A matrix of these sizes. Version 1 has no scales, so it can only hold matrices of F32.
+    pub(super) fn matrix(
+        &mut self,
+        kind: OperatorKind,
+        section: &str,
+        [rows, columns]: [usize; 2],
+    ) -> Result<StoredMatrix<'a>, DictionaryError> {
+        self.check_length(section, rows * columns)?;
+        let section = StoredSection {
+            values: section,
+            scales: &scales_name(section),
+            rows,
+            columns,
+            modes: kind.modes(),
+        };
+        Ok(read_stored(self.container, &section, self.budget)?)
+    }
+
+    /// A section of finite numbers, which must have the expected length.
     pub(super) fn numbers(
         &mut self,
         section: &str,
@@ -134,6 +155,7 @@ impl Source<'_, '_, '_> {
         Ok(self.container.finite_numbers(section, self.budget)?)
     }
 
+    /// A section of exactly `N` sizes.
     pub(super) fn sizes<const N: usize>(
         &mut self,
         section: &str,
@@ -147,6 +169,7 @@ impl Source<'_, '_, '_> {
         Ok(sizes.map(|n| n as usize))
     }
 
+    /// Checks the number of elements of a section.
     pub(super) fn check_length(
         &self,
         section: &str,
@@ -165,6 +188,7 @@ impl Source<'_, '_, '_> {
     }
 }
 
+/// Checks that a size, named `what` in the error, is in `low..=high`.
 pub(super) fn check_size(
     what: &'static str,
     found: usize,
@@ -183,7 +207,7 @@ pub(super) fn check_size(
     }
 }
 
-/// The shape of that name, which stands at `index` of a list of shapes.
+/// The shape with a name from position `index` of a list of shapes.
 pub(super) fn known_shape(index: usize, name: &str) -> Result<&'static Shape, DictionaryError> {
     Shape::from_name(name).ok_or_else(|| DictionaryError::UnknownShape {
         index,
@@ -192,7 +216,7 @@ pub(super) fn known_shape(index: usize, name: &str) -> Result<&'static Shape, Di
     })
 }
 
-/// Name of the section of scales of a matrix.
+/// Name of the section with the scales of a matrix.
 pub(super) fn scales_name(values: &str) -> String {
     format!("{values}*")
 }

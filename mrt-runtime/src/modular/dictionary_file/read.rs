@@ -1,4 +1,4 @@
-//! Reads version 2.
+//! Reads dictionary files of version 2.
 
 use crate::level::shape::{Hole, SHAPES, Shape};
 use crate::level::warp_transport::WarpTransport;
@@ -8,10 +8,10 @@ use crate::modular::dictionary::{
 };
 use crate::modular::dictionary_file::format::{
     DictionaryError, MAX_MODES, MAX_PROBES, MAX_RESOLUTION, MAX_VARIANTS, Source, check_size,
-    known_shape, scales_name,
+    known_shape,
 };
 use crate::modular::path::{MAX_WORD, Word};
-use mrt_core::storage::{StoredMatrix, StoredSection, read_stored};
+use mrt_core::storage::StoredMatrix;
 
 type Operators<'a> = ShapeOperators<StoredMatrix<'a>>;
 
@@ -64,7 +64,7 @@ pub(super) fn read<'a>(
     })
 }
 
-/// The section `sizes`.
+/// Content of the section `sizes`.
 struct Sizes {
     resolution: usize,
     probes: usize,
@@ -82,63 +82,40 @@ struct Sizes {
 
 impl Sizes {
     fn read(source: &mut Source) -> Result<Self, DictionaryError> {
-        let sizes = source.sizes("sizes")?;
-        let limits: [(&str, usize, usize); 11] = [
-            ("resolution", 1, MAX_RESOLUTION),
-            ("number of probes along an edge", 0, MAX_PROBES),
-            ("number of shapes", 1, SHAPES.len()),
-            ("number of variants", 0, MAX_VARIANTS),
-            ("number of lightfield modes", 0, MAX_MODES),
-            ("number of emission modes", 1, MAX_MODES),
-            ("number of response modes", 1, MAX_MODES),
-            ("mark of vertical openings", 0, 1),
-            ("number of holes", 0, Hole::ALL.len()),
-            ("depth of paths", 0, MAX_WORD),
-            ("depth of paths with holes", 0, MAX_WORD),
-        ];
-        for ((what, low, high), found) in limits.into_iter().zip(sizes) {
-            check_size(what, found, low, high)?;
-        }
-        let [
-            resolution,
-            probes,
-            shapes,
-            variants,
-            lightfield_modes,
-            emission_modes,
-            response_modes,
-            vertical,
-            holes,
-            depth,
-            hole_depth,
-        ] = sizes;
+        let mut sizes = source.sizes::<11>("sizes")?.into_iter();
+        let mut next = |what, low, high| {
+            let found = sizes.next().unwrap_or_default();
+            check_size(what, found, low, high).map(|()| found)
+        };
+        // In the order of the file.
         Ok(Self {
-            resolution,
-            probes,
-            shapes,
-            variants,
-            lightfield_modes,
-            emission_modes,
-            response_modes,
-            vertical,
-            holes,
-            depth,
-            hole_depth,
+            resolution: next("resolution", 1, MAX_RESOLUTION)?,
+            probes: next("number of probes along an edge", 0, MAX_PROBES)?,
+            shapes: next("number of shapes", 1, SHAPES.len())?,
+            variants: next("number of variants", 0, MAX_VARIANTS)?,
+            lightfield_modes: next("number of lightfield modes", 0, MAX_MODES)?,
+            emission_modes: next("number of emission modes", 1, MAX_MODES)?,
+            response_modes: next("number of response modes", 1, MAX_MODES)?,
+            vertical: next("mark of vertical openings", 0, 1)?,
+            holes: next("number of holes", 0, Hole::ALL.len())?,
+            depth: next("depth of paths", 0, MAX_WORD)?,
+            hole_depth: next("depth of paths with holes", 0, MAX_WORD)?,
         })
     }
 
+    /// Rows of a basis of probes: nine coefficients for each probe.
     fn probe_rows(&self) -> usize {
         9 * self.probes * self.probes * self.probes
     }
 }
 
-/// The words of a text, which must be so many.
+/// The words of a text section, which must be exactly `expected`.
 fn listed<'t>(
     section: &str,
     text: &'t str,
     expected: usize,
 ) -> Result<Vec<&'t str>, DictionaryError> {
-    // One more than expected shows that there are too many, and bounds what is allocated.
+    // One word more than expected shows that there are too many, and limits the memory.
     let words: Vec<&str> = text.split_ascii_whitespace().take(expected + 1).collect();
     if words.len() == expected {
         Ok(words)
@@ -164,24 +141,7 @@ impl<'a> Source<'a, '_, '_> {
         }
     }
 
-    fn matrix(
-        &mut self,
-        kind: OperatorKind,
-        section: &str,
-        [rows, columns]: [usize; 2],
-    ) -> Result<StoredMatrix<'a>, DictionaryError> {
-        self.check_length(section, rows * columns)?;
-        let section = StoredSection {
-            values: section,
-            scales: &scales_name(section),
-            rows,
-            columns,
-            modes: kind.modes(),
-        };
-        Ok(read_stored(self.container, &section, self.budget)?)
-    }
-
-    /// A matrix of these sizes, or one without rows.
+    /// A matrix of these sizes, or one without rows if the section is empty.
     fn matrix_or_empty(
         &mut self,
         kind: OperatorKind,
@@ -280,7 +240,7 @@ fn read_variants<'a>(
 fn variant_of_name(name: &str, shapes: &[Operators]) -> Option<(WarpTransport, &'static Shape)> {
     let (shape, transport) = name.split_once(':')?;
     let shape = shapes.iter().find(|entry| entry.shape.name == shape)?.shape;
-    // Round tubes have none.
+    // Round tubes have no variants.
     if shape.tube().is_some() {
         return None;
     }

@@ -1,15 +1,14 @@
-//! Reads version 1, whose operators are those of the paper.
+//! Reads dictionary files of version 1, whose operators are those of the paper.
 //!
-//! It has no path table, and a response basis for all openings where version 2 has a joint basis a shape. Both are
-//! special cases: lightfield modes serve as emission modes, so `R_b->rlf` as emission; and the columns of a
-//! joint basis are those of `U_b`, then for each opening those of `U_r` as light through it meets the walls, each
-//! response being a joint coefficient. Scenes are then lit by passing on lightfields, with the same products as
-//! ever.
+//! Version 1 has no path table, and one response basis for all openings instead of a joint basis for each shape. It
+//! becomes a special case of version 2. Lightfield modes serve as emission modes, and `R_b->rlf` as emission. The
+//! columns of a joint basis are those of `U_b`, then, for each opening, those of `U_r` turned to the walls behind that
+//! opening; each response is a joint coefficient. Scenes are lit by lightfields, with the products of version 1.
 //!
 //! Sections: `preset`, `settings`, `sizes` (resolution, shapes, lightfield modes, response modes), `left`,
 //! `straight`, `right`, `T_rlf_r`, `U_r` (on the five walls of the cube open at -z), `dropped` (of lightfield and
 //! response modes); for shape n `n.name`, `n.sigma`, `n.T_d_b`, `n.U_b`, `n.L_imp`, `n.drop` and one `n.R<m>` an
-//! opening. All numbers are F32. Shapes opened sideways only.
+//! opening. All numbers are F32. Shapes open sideways only.
 
 use crate::level::shape::{Outline, SHAPES, Shape};
 use crate::modular::dictionary::{
@@ -17,15 +16,15 @@ use crate::modular::dictionary::{
     StoredDictionary,
 };
 use crate::modular::dictionary_file::format::{
-    DictionaryError, MAX_MODES, MAX_RESOLUTION, Source, check_size, known_shape, scales_name,
+    DictionaryError, MAX_MODES, MAX_RESOLUTION, Source, check_size, known_shape,
 };
 use crate::modular::path::frame_of_heading;
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::Matrix;
-use mrt_core::storage::{Storage, StoredMatrix, StoredSection, read_stored};
+use mrt_core::storage::{Storage, StoredMatrix};
 
-/// Shapes that version 1 knows.
+/// Number of shapes that version 1 has: the first ones of [`SHAPES`].
 const SHAPE_COUNT: usize = 6;
 
 pub(super) fn read<'a>(
@@ -39,20 +38,20 @@ pub(super) fn read<'a>(
     let receiver_texels = 5 * resolution * resolution;
     let kind = OperatorKind::Lightfield;
     let dropped = source.numbers("dropped", 2)?;
-    let left = source.old_matrix(kind, "left", [fields, fields])?;
-    let right = source.old_matrix(kind, "right", [fields, fields])?;
+    let left = source.matrix(kind, "left", [fields, fields])?;
+    let right = source.matrix(kind, "right", [fields, fields])?;
     let identity = source.owned(kind, fields, fields, |i, j| if i == j { 1.0 } else { 0.0 })?;
     let lightfields = LightfieldOperators {
         parity: mirror_parity(&left, &right)?,
         from_emission: identity,
-        straight: source.old_matrix(kind, "straight", [fields, fields])?,
+        straight: source.matrix(kind, "straight", [fields, fields])?,
         left,
         exchange: StoredMatrix::empty(0, fields),
         holes: Vec::new(),
-        response_from_lightfield: source.old_matrix(kind, "T_rlf_r", [responses, fields])?,
+        response_from_lightfield: source.matrix(kind, "T_rlf_r", [responses, fields])?,
         dropped_energy: dropped[0],
     };
-    let response_basis = source.old_matrix(
+    let response_basis = source.matrix(
         OperatorKind::ResponseSource,
         "U_r",
         [receiver_texels, responses],
@@ -75,7 +74,7 @@ pub(super) fn read<'a>(
         shapes,
         lightfields,
         paths: PathTable {
-            // Only shapes that open upwards ask for these, and paths of a table.
+            // Only path tables and shapes that open upwards use these.
             emission_parity: vec![0; fields],
             response_parity: vec![0; responses],
             depth: 0,
@@ -90,25 +89,7 @@ pub(super) fn read<'a>(
 }
 
 impl<'a> Source<'a, '_, '_> {
-    fn old_matrix(
-        &mut self,
-        kind: OperatorKind,
-        section: &str,
-        [rows, columns]: [usize; 2],
-    ) -> Result<StoredMatrix<'a>, DictionaryError> {
-        self.check_length(section, rows * columns)?;
-        let section = StoredSection {
-            values: section,
-            // This version had none: other types than F32 are refused for want of it.
-            scales: &scales_name(section),
-            rows,
-            columns,
-            modes: kind.modes(),
-        };
-        Ok(read_stored(self.container, &section, self.budget)?)
-    }
-
-    /// A matrix that the file does not hold.
+    /// A matrix that is not in the file.
     fn owned(
         &mut self,
         kind: OperatorKind,
@@ -116,7 +97,7 @@ impl<'a> Source<'a, '_, '_> {
         columns: usize,
         f: impl FnMut(usize, usize) -> f32,
     ) -> Result<StoredMatrix<'a>, DictionaryError> {
-        // Once for the matrix, once for its form as stored.
+        // The matrix exists twice meanwhile: as `f32`, and as stored.
         let bytes = 2 * size_of::<f32>() as u64 * rows as u64 * columns as u64;
         self.budget.spend("operators of version 1", bytes)?;
         let matrix = Matrix::from_fn(rows, columns, f);
@@ -124,10 +105,9 @@ impl<'a> Source<'a, '_, '_> {
     }
 }
 
-/// Which modes are odd in x: the mirror makes `right` of `left`, right = D left D with signs D.
+/// Parity of each mode in x. The mirror turns `left` into `right`: right = D left D, with the signs D of the modes.
 ///
-/// Signs of modes that no sequence of elements joins are free, and then do not matter: odd ones among them would
-/// change no product.
+/// If no sequence of nonzero elements connects two modes, their relative sign is undetermined, and changes no product.
 fn mirror_parity(left: &StoredMatrix, right: &StoredMatrix) -> Result<Vec<u8>, DictionaryError> {
     let modes = left.rows();
     let mut parity: Vec<Option<u8>> = vec![None; modes];
@@ -176,15 +156,12 @@ fn read_shape<'a>(
 ) -> Result<ShapeOperators<StoredMatrix<'a>>, DictionaryError> {
     let section = |suffix: &str| format!("{index}.{suffix}");
     let shape = known_shape(index, source.container.text(&section("name"))?)?;
-    // Names that came later are as unknown here as made-up ones.
+    // Shapes that were added later are unknown in version 1.
     if !opens_sideways(shape) {
+        let names: Vec<&str> = SHAPES[..SHAPE_COUNT].iter().map(|s| s.name).collect();
         return Err(DictionaryError::UnknownShape {
             index,
-            expected: SHAPES[..SHAPE_COUNT]
-                .iter()
-                .map(|shape| shape.name)
-                .collect::<Vec<_>>()
-                .join(", "),
+            expected: names.join(", "),
             found: shape.name.to_owned(),
         });
     }
@@ -193,26 +170,13 @@ fn read_shape<'a>(
     let texels = shape.texel_count(resolution);
     let responses = response_basis.columns();
     let joint_modes = modes + shape.openings.len() * responses;
-    let own = source.old_matrix(OperatorKind::JointBasis, &section("U_b"), [texels, modes])?;
-    let rows: Vec<Vec<usize>> = shape
-        .openings
-        .iter()
-        .map(|opening| receiver_texels(shape, opening.face, resolution))
-        .collect();
-    let joint_basis = source.owned(
-        OperatorKind::JointBasis,
-        texels,
-        joint_modes,
-        |i, j| match j.checked_sub(modes) {
-            None => own.get(i, j),
-            Some(k) => response_basis.get(rows[k / responses][i], k % responses),
-        },
-    )?;
+    let own = source.matrix(OperatorKind::JointBasis, &section("U_b"), [texels, modes])?;
+    let joint_basis = joint_basis(source, shape, resolution, &own, response_basis)?;
     let mut openings = Vec::with_capacity(shape.openings.len());
     for m in 0..shape.openings.len() {
         let first = modes + m * responses;
         openings.push(OpeningOperators {
-            emission_from_coefficients: vec![source.old_matrix(
+            emission_from_coefficients: vec![source.matrix(
                 OperatorKind::Emission,
                 &section(&format!("R{m}")),
                 [fields, modes],
@@ -227,7 +191,7 @@ fn read_shape<'a>(
     }
     Ok(ShapeOperators {
         shape,
-        coefficients_from_direct: source.old_matrix(
+        coefficients_from_direct: source.matrix(
             OperatorKind::CoefficientsFromDirect,
             &section("T_d_b"),
             [modes, texels],
@@ -236,15 +200,39 @@ fn read_shape<'a>(
         probe_basis: StoredMatrix::empty(0, joint_modes),
         vector_basis: StoredMatrix::empty(0, joint_modes),
         openings,
-        implicit_lighting: source.old_matrix(
+        implicit_lighting: source.matrix(
             OperatorKind::ImplicitLighting,
             &section("L_imp"),
             [texels, modes],
         )?,
         singular_values: source.numbers(&section("sigma"), modes)?,
         dropped_energy: source.numbers(&section("drop"), 1)?[0],
-        // Nothing is projected: each response is a joint coefficient.
+        // Nothing is dropped by projection: each response is a joint coefficient.
         joint_dropped_energy: 0.0,
+    })
+}
+
+/// Columns of `U_b`, then for each opening those of `U_r` as light through it meets the walls.
+fn joint_basis<'a>(
+    source: &mut Source<'a, '_, '_>,
+    shape: &Shape,
+    resolution: usize,
+    own: &StoredMatrix,
+    response_basis: &StoredMatrix,
+) -> Result<StoredMatrix<'a>, DictionaryError> {
+    let (modes, responses) = (own.columns(), response_basis.columns());
+    let rows: Vec<Vec<usize>> = shape
+        .openings
+        .iter()
+        .map(|opening| receiver_texels(shape, opening.face, resolution))
+        .collect();
+    let columns = modes + shape.openings.len() * responses;
+    let kind = OperatorKind::JointBasis;
+    source.owned(kind, own.rows(), columns, |i, j| {
+        match j.checked_sub(modes) {
+            None => own.get(i, j),
+            Some(k) => response_basis.get(rows[k / responses][i], k % responses),
+        }
     })
 }
 
@@ -253,7 +241,8 @@ fn opens_sideways(shape: &Shape) -> bool {
     openings.all(|opening| opening.outline == Outline::Whole && opening.face.axis() != 1)
 }
 
-/// Rows of `U_r` of a shape's texels, for light that enters by a face: the cube open at -z, turned about +Y to it.
+/// For each texel of a shape, its row of `U_r` for light that enters by a face. The rows of `U_r` are texels of the
+/// cube that is open at -z, which is turned about +Y.
 fn receiver_texels(shape: &Shape, entered: Face, resolution: usize) -> Vec<usize> {
     let canonical: CubeSymmetry = frame_of_heading(entered.opposite()).inverse();
     shape

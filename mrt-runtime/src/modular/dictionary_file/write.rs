@@ -1,6 +1,8 @@
-//! Writes version 2.
+//! Writes dictionary files of version 2.
 
-use crate::modular::dictionary::{Dictionary, OperatorKind, OperatorMatrix, ShapeOperators};
+use crate::modular::dictionary::{
+    Dictionary, LightfieldOperators, OperatorKind, OperatorMatrix, PathTable, ShapeOperators,
+};
 use crate::modular::dictionary_file::format::{
     DictionaryError, FORMAT, MAX_VARIANTS, check_size, scales_name,
 };
@@ -8,20 +10,35 @@ use mrt_core::container::{ContainerError, Writer};
 use mrt_core::storage::write_stored;
 
 impl<M: OperatorMatrix> Dictionary<M> {
-    /// The bytes of a dictionary file, matrices as they are stored here; the same dictionary gives the same bytes.
+    /// The bytes of a dictionary file, with matrices in their present number formats. The same dictionary gives the
+    /// same bytes.
     ///
     /// # Errors
-    /// [`DictionaryError::Container`], if there are more matrices than the container has room for, and
-    /// [`DictionaryError::Size`] for more than [`MAX_VARIANTS`] variants.
+    /// [`DictionaryError::Container`], if there are more matrices than a container can hold; [`DictionaryError::Size`],
+    /// if there are more than [`MAX_VARIANTS`] variants.
     ///
     /// # Panics
-    /// If an element is infinite or not a number.
+    /// If an element is infinite or NaN.
     pub fn to_bytes(&self) -> Result<Vec<u8>, DictionaryError> {
-        let (fields, paths) = (&self.lightfields, &self.paths);
         check_size("number of variants", self.variants.len(), 0, MAX_VARIANTS)?;
         let mut writer = Writer::new(FORMAT);
         writer.add_text("preset", &self.preset)?;
         writer.add_text("settings", &self.settings)?;
+        self.add_sizes(&mut writer)?;
+        add_lightfields(&mut writer, &self.lightfields)?;
+        add_paths(&mut writer, &self.paths)?;
+        self.add_shapes(&mut writer)?;
+        if let Some(sources) = &self.sources {
+            let (emission, response) = (&sources.emission_from_radiosity, &sources.response_basis);
+            add(&mut writer, "B_e", OperatorKind::EmissionSource, emission)?;
+            add(&mut writer, "U_r", OperatorKind::ResponseSource, response)?;
+        }
+        Ok(writer.finish())
+    }
+
+    /// Sizes, shares of energy left out, and parities.
+    fn add_sizes(&self, writer: &mut Writer) -> Result<(), ContainerError> {
+        let (fields, paths) = (&self.lightfields, &self.paths);
         let sizes = [
             self.resolution,
             self.probes,
@@ -50,30 +67,11 @@ impl<M: OperatorMatrix> Dictionary<M> {
             let numbers: Vec<u16> = parity.iter().map(|&p| u16::from(p)).collect();
             writer.add_numbers(name, &numbers)?;
         }
-        let lightfield = OperatorKind::Lightfield;
-        for (name, matrix) in [
-            ("e_rlf", &fields.from_emission),
-            ("left", &fields.left),
-            ("ahead", &fields.straight),
-            ("swap", &fields.exchange),
-            ("T_rlf_r", &fields.response_from_lightfield),
-        ] {
-            add(&mut writer, name, lightfield, matrix)?;
-        }
-        for (hole, matrix) in fields.holes.iter().enumerate() {
-            add(&mut writer, &format!("hole{hole}"), lightfield, matrix)?;
-        }
-        let words = paths.entries.iter().map(|entry| entry.word.name());
-        writer.add_text("words", &words.collect::<Vec<_>>().join(" "))?;
-        for (index, entry) in paths.entries.iter().enumerate() {
-            let matrix = &entry.response_from_emission;
-            add(
-                &mut writer,
-                &format!("P{index}"),
-                OperatorKind::Path,
-                matrix,
-            )?;
-        }
+        Ok(())
+    }
+
+    /// Names and operators of shapes and variants.
+    fn add_shapes(&self, writer: &mut Writer) -> Result<(), ContainerError> {
         let shapes = self.shapes.iter().map(|entry| entry.shape.name);
         writer.add_text("shapes", &shapes.collect::<Vec<_>>().join(" "))?;
         let variants = self.variants.iter().map(|variant| {
@@ -90,15 +88,43 @@ impl<M: OperatorMatrix> Dictionary<M> {
         writer.add_numbers("corners", &corners)?;
         let variants = self.variants.iter().map(|variant| &variant.operators);
         for (index, entry) in self.shapes.iter().chain(variants).enumerate() {
-            add_shape(&mut writer, index, entry)?;
+            add_shape(writer, index, entry)?;
         }
-        if let Some(sources) = &self.sources {
-            let (emission, response) = (&sources.emission_from_radiosity, &sources.response_basis);
-            add(&mut writer, "B_e", OperatorKind::EmissionSource, emission)?;
-            add(&mut writer, "U_r", OperatorKind::ResponseSource, response)?;
-        }
-        Ok(writer.finish())
+        Ok(())
     }
+}
+
+fn add_lightfields(
+    writer: &mut Writer,
+    fields: &LightfieldOperators<impl OperatorMatrix>,
+) -> Result<(), ContainerError> {
+    let kind = OperatorKind::Lightfield;
+    for (name, matrix) in [
+        ("e_rlf", &fields.from_emission),
+        ("left", &fields.left),
+        ("ahead", &fields.straight),
+        ("swap", &fields.exchange),
+        ("T_rlf_r", &fields.response_from_lightfield),
+    ] {
+        add(writer, name, kind, matrix)?;
+    }
+    for (hole, matrix) in fields.holes.iter().enumerate() {
+        add(writer, &format!("hole{hole}"), kind, matrix)?;
+    }
+    Ok(())
+}
+
+fn add_paths(
+    writer: &mut Writer,
+    paths: &PathTable<impl OperatorMatrix>,
+) -> Result<(), ContainerError> {
+    let words = paths.entries.iter().map(|entry| entry.word.name());
+    writer.add_text("words", &words.collect::<Vec<_>>().join(" "))?;
+    for (index, entry) in paths.entries.iter().enumerate() {
+        let matrix = &entry.response_from_emission;
+        add(writer, &format!("P{index}"), OperatorKind::Path, matrix)?;
+    }
+    Ok(())
 }
 
 fn add(

@@ -1,12 +1,12 @@
-//! Bounces: which blocks take part, and the stages of a pass over them.
+//! The bounces of a frame: the passes, and the stages of each pass.
 
-use crate::executor::{run_parts, task_count};
+use crate::executor::run_parts;
 use crate::modular::frame::config::{Bounces, FrameConfig, MAX_PASSES};
 use crate::modular::frame::flux_limit::limit_flux;
 use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::report::FrameWork;
 use crate::modular::frame::schedule::{Kept, Schedule};
-use crate::modular::frame::split::{Cut, CutPlanes, part_of, span};
+use crate::modular::frame::split::{Cut, CutPlanes, parts_of};
 use crate::modular::frame::stage_clock::{Stage, StageClock};
 use crate::modular::frame::surface::Surface;
 use crate::modular::frame::tasks::{Receivers, Senders, Unfolding};
@@ -21,16 +21,17 @@ pub(super) struct BounceStage<'a> {
     pub light: &'a mut LightBuffers,
     pub work: &'a mut FrameWork,
     pub clock: &'a mut StageClock,
-    /// Some blocks still wait for direct light.
+    /// Whether some blocks still wait for direct light.
     pub direct_waits: bool,
 }
 
-/// What a pass does with the light of the frame before.
+/// What a pass does with the light of the previous frame.
 #[derive(Clone, Copy, Debug)]
 struct Pass {
-    /// Indirect light is reflected, not only direct light and emission.
+    /// Whether walls reflect indirect light too, not only direct light.
     reflects_indirect: bool,
-    /// Light that hardly changes may be kept, and blocks may wait for a later frame.
+    /// Whether the pass continues the previous frame: light that hardly changes may be kept, and blocks may wait for a
+    /// later frame.
     goes_on: bool,
 }
 
@@ -63,7 +64,7 @@ impl BounceStage<'_> {
         }
         let mut passes = 0;
         while passes < limit.min(MAX_PASSES) {
-            // The second pass is the first that reflects indirect light, wherever there is some.
+            // The second pass is the first that reflects indirect light, so every lit block changes.
             self.schedule.all_stale |= passes == 1;
             let change = self.pass(Pass {
                 reflects_indirect: passes > 0,
@@ -77,7 +78,7 @@ impl BounceStage<'_> {
         passes
     }
 
-    /// Takes all indirect light away.
+    /// Sets all indirect light to 0.
     fn darken(&mut self) {
         self.light.coefficients.fill(0.0);
         self.light.joint.fill(0.0);
@@ -94,7 +95,7 @@ impl BounceStage<'_> {
         }
     }
 
-    /// Products of doors' values.
+    /// Computes, for each gate, the product of the values of its doors.
     fn update_gates(&mut self) {
         if !std::mem::take(&mut self.schedule.doors_moved) {
             return;
@@ -108,8 +109,8 @@ impl BounceStage<'_> {
         }
     }
 
-    /// One bounce of what the walls reflect and emit. Returns the largest change of irradiance over the largest
-    /// irradiance; in a pass that starts from darkness that is 1, or 0 without light.
+    /// Computes one bounce of the light that walls reflect and emit. Returns the largest change of irradiance divided
+    /// by the largest irradiance: 1 for a pass that starts from darkness, 0 without light.
     fn pass(&mut self, pass: Pass) -> f32 {
         let all = std::mem::take(&mut self.schedule.all_stale);
         let tolerance = if pass.goes_on {
@@ -118,13 +119,13 @@ impl BounceStage<'_> {
         } else {
             0.0
         };
-        // 1. b = T_d->b l, where what leaves the walls changed.
+        // 1. b = T_d->b l, for blocks whose radiosity changed.
         self.schedule.take_sources(all, tolerance);
         self.work.sources += self.schedule.sources.len();
         self.update_coefficients(pass.reflects_indirect);
         self.await_targets(all);
         self.clock.lap(Stage::Coefficients);
-        // 2. r = T_b->r b, where that arrives.
+        // 2. r = T_b->r b, for blocks that changed light reaches.
         let waiting = self.schedule.waiting.len();
         let count = match self.config.slice {
             Some(slice) if pass.goes_on => slice.get().min(waiting),
@@ -138,10 +139,10 @@ impl BounceStage<'_> {
         }
         self.work.targets += self.schedule.targets.len();
         self.clock.lap(Stage::Responses);
-        // 3. U_b b + U_r r, where it changes.
+        // 3. U_b b + U_r r, for blocks whose joint coefficients changed.
         self.update_indirect();
         let change = self.schedule.note_arrivals();
-        // 4. Bounces must not grow without end.
+        // 4. Limit the flux, so that bounces do not grow without end.
         let nothing_waits = self.schedule.waiting.is_empty() && !self.direct_waits;
         self.work.limited += limit_flux(self.scene, self.schedule, self.light, nothing_waits);
         let peak = self.schedule.peak();
@@ -154,7 +155,7 @@ impl BounceStage<'_> {
         }
     }
 
-    /// Lets the blocks wait for light that the sources send to, or did.
+    /// Makes the blocks wait that a source sends light to, or sent light to before.
     fn await_targets(&mut self, all: bool) {
         let schedule = &mut *self.schedule;
         for k in 0..schedule.sources.len() {
@@ -173,7 +174,7 @@ impl BounceStage<'_> {
         }
     }
 
-    /// Coefficients b of the sources.
+    /// Computes coefficients b of the sources.
     fn update_coefficients(&mut self, reflects_indirect: bool) {
         let executor = &*self.config.executor;
         let level = self.config.simd;
@@ -186,34 +187,27 @@ impl BounceStage<'_> {
             has_coefficients,
             ..
         } = &mut *self.schedule;
-        let (list, tasks) = (
-            &*sources,
-            task_count(executor, sources.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(sources, executor, &mut self.light.scratch);
         let mut coefficients = Cut::new(&mut self.light.coefficients, size);
         let mut flags = Cut::new(has_coefficients, 1);
         let mut state = Cut::new(state, 1);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            Some(Senders {
-                scene,
-                surface,
-                list,
-                first: span.start,
-                direct,
-                indirect: reflects_indirect.then_some(indirect),
-                coefficients: coefficients.take(span.clone()),
-                flags: flags.take(span.clone()),
-                state: state.take(span),
-                scratch: scratch.next()?,
-            })
+        let parts = parts.map(|part| Senders {
+            scene,
+            surface,
+            list: part.list,
+            first: part.span.start,
+            direct,
+            indirect: reflects_indirect.then_some(indirect),
+            coefficients: coefficients.take(part.span.clone()),
+            flags: flags.take(part.span.clone()),
+            state: state.take(part.span),
+            scratch: part.scratch,
         });
         run_parts(executor, parts, |part| level.run(part));
     }
 
-    /// Joint coefficients of the targets. Those that change light by no more than `keep_within` stay what they were.
+    /// Computes joint coefficients of the targets. A block whose light would change by at most `keep_within`, W/m²,
+    /// keeps its old ones.
     fn update_responses(&mut self, keep_within: Option<f32>) {
         let executor = &*self.config.executor;
         let level = self.config.simd;
@@ -229,64 +223,50 @@ impl BounceStage<'_> {
         } = &mut *self.schedule;
         let has_coefficients = &*has_coefficients;
         let all_lit = *lit == has_coefficients.len();
-        let (list, tasks) = (
-            &*targets,
-            task_count(executor, targets.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(targets, executor, &mut self.light.scratch);
         let mut joint = Cut::new(&mut self.light.joint, size);
         let mut state = Cut::new(state, 1);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            Some(Receivers {
-                scene,
-                list,
-                first: span.start,
-                coefficients,
-                has_coefficients,
-                all_lit,
-                gate_values,
-                keep_within,
-                joint: joint.take(span.clone()),
-                state: state.take(span),
-                scratch: scratch.next()?,
-            })
+        let parts = parts.map(|part| Receivers {
+            scene,
+            list: part.list,
+            first: part.span.start,
+            coefficients,
+            has_coefficients,
+            all_lit,
+            gate_values,
+            keep_within,
+            joint: joint.take(part.span.clone()),
+            state: state.take(part.span),
+            scratch: part.scratch,
         });
         run_parts(executor, parts, |part| level.run(part));
     }
 
-    /// Indirect light of the targets.
+    /// Computes indirect light of the targets.
     fn update_indirect(&mut self) {
         let executor = &*self.config.executor;
         let level = self.config.simd;
         let scene = self.scene;
         let joint = &self.light.joint;
-        // After one bounce, changes are not needed.
+        // With a single bounce, nothing depends on how much light changes.
         let compare = self.schedule.kept != Kept::Once;
         let Schedule { targets, state, .. } = &mut *self.schedule;
-        let (list, tasks) = (
-            &*targets,
-            task_count(executor, targets.len()).min(self.light.scratch.len()),
-        );
+        let parts = parts_of(targets, executor, &mut self.light.scratch);
         let mut state = Cut::new(state, 1);
         let mut planes = CutPlanes::new(&mut self.light.indirect);
-        let mut scratch = self.light.scratch.iter_mut();
-        let parts = (0..tasks).map_while(|k| {
-            let list = part_of(list, tasks, k).filter(|list| !list.is_empty())?;
-            let span = span(list);
-            let slots = scene.layout.slots_of_span(&span);
-            Some(Unfolding {
+        let parts = parts.map(|part| {
+            let slots = scene.layout.slots_of_span(&part.span);
+            Unfolding {
                 scene,
-                list,
-                first: span.start,
+                list: part.list,
+                first: part.span.start,
                 first_slot: slots.start,
                 joint,
                 compare,
-                state: state.take(span),
+                state: state.take(part.span),
                 planes: planes.take(slots),
-                scratch: scratch.next()?,
-            })
+                scratch: part.scratch,
+            }
         });
         run_parts(executor, parts, |part| level.run(part));
     }

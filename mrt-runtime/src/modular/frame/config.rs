@@ -1,4 +1,4 @@
-//! What callers choose about frames.
+//! Settings of frames.
 
 use crate::executor::{Executor, Serial};
 use crate::output::probe_order::ProbeOrder;
@@ -6,39 +6,39 @@ use mrt_core::simd::SimdLevel;
 use std::num::NonZero;
 use std::sync::Arc;
 
-/// Passes in one frame, at most: at albedo 0.99 the light left after them is 1e-18 of the first.
+/// Most passes of one solve: at albedo 0.99, the light left after them is 1e-18 of the first bounce.
 pub const MAX_PASSES: u32 = 4096;
 
-/// Which bounces a frame computes; more than [`MAX_PASSES`] passes are not made.
+/// Which bounces a frame computes, with at most [`MAX_PASSES`] passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bounces {
-    /// This many, each a pass over the reduced operators; 0 leaves indirect light at zero.
+    /// A number of bounces, each a pass over the reduced operators; 0 leaves indirect light at zero.
     Count(u32),
-    /// One pass that reflects the previous frame's indirect light with this frame's direct light: many
-    /// bounces over a few frames at the cost of one.
+    /// One pass that reflects the direct light of this frame and the indirect light of the previous one: many bounces
+    /// over a few frames, at the cost of one bounce a frame.
     Feedback,
-    /// Passes until no texel changes by more than `tolerance` of the brightest, at most `limit`.
+    /// Passes until no texel changes by more than `tolerance` times the brightest texel; at most `limit` passes.
     Converged {
         /// Relative change at which to stop.
         tolerance: f32,
-        /// Most passes.
+        /// Most passes to make.
         limit: u32,
     },
 }
 
-/// What a frame computes besides irradiance.
+/// What a frame computes besides irradiance at texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outputs {
-    /// The lightmap.
+    /// Whether to fill the lightmap.
     pub lightmap: bool,
-    /// Probes, with so many coefficients.
+    /// Order of probes; `None` for no probes.
     pub probes: Option<ProbeOrder>,
-    /// Vector irradiance at texels.
+    /// Whether to compute vector irradiance at texels.
     pub vector: bool,
 }
 
 impl Default for Outputs {
-    /// The lightmap alone.
+    /// The lightmap only.
     fn default() -> Self {
         Self {
             lightmap: true,
@@ -51,33 +51,39 @@ impl Default for Outputs {
 /// How frames are computed.
 #[derive(Clone, Debug)]
 pub struct FrameConfig {
-    /// What to compute besides irradiance.
+    /// What to compute besides irradiance at texels.
     pub outputs: Outputs,
-    /// How often light is reflected.
+    /// Which bounces to compute.
     pub bounces: Bounces,
-    /// Instructions to use; the scalar reference where the machine lacks them.
+    /// Vector instructions to use. On a machine without them, the scalar reference runs.
     pub simd: SimdLevel,
-    /// Irradiance, W/m², by which a texel's light may change before its block's light is sent out anew, and by which light
-    /// that arrives may change before it is shown; with [`Bounces::Count`] of 1 and [`Bounces::Feedback`]. With albedos of
-    /// up to a, indirect light is then off by at most `tolerance (1 + a)` after one bounce, and by
-    /// `tolerance (1 + a) / (1 - a)` over all; vector irradiance by no more, and coefficients of probes, which are turned
-    /// to the world's axes five at a time, by √5 times that. At 0, the
-    /// default, what is kept is kept because nothing about it changed, bit by bit; with feedback, rounding then changes
-    /// the last bits for ever, and some 1e-6 of the brightest irradiance lets static light come to rest. With 1e-3 of the
-    /// brightest, one moving lamp of four in a maze of 41 blocks takes 0.39 of the time of all.
+    /// Changes of irradiance, W/m², that a frame may ignore: a block sends its light out again only when a texel
+    /// changes by more, and light that arrives is shown only when it changes by more. It applies to [`Bounces::Count`]
+    /// of 1 and [`Bounces::Feedback`].
+    ///
+    /// The default, 0, keeps only values that did not change at all. With feedback, rounding then changes the last bits
+    /// of static light for ever; 1e-6 of the brightest irradiance lets it come to rest. With 1e-3 of the brightest, a
+    /// frame in which one of four lamps moves takes 0.39 of the full time in a maze of 41 blocks.
+    ///
+    /// With albedos of up to a, the error of indirect light is at most `tolerance (1 + a)` after one bounce, and
+    /// `tolerance (1 + a) / (1 - a)` over all bounces. The error of vector irradiance is no larger; that of the
+    /// coefficients of probes, which are rotated to world axes up to five at a time, is at most √5 times as large.
     pub tolerance: f32,
-    /// Blocks whose light is brought up to date in a frame, at most, with the same bounces. When n blocks need it, the
-    /// last of them waits for n / `slice` frames, rounded up: oldest first; direct light, and then indirect light as long
-    /// again. Light that moves is there twice meanwhile; where indirect light comes to twice the most that left the walls,
-    /// all of it is scaled down until the last block had its turn. `None`, the default: all.
+    /// Most blocks whose light one frame brings up to date; `None`, the default, means all. It applies to
+    /// [`Bounces::Count`] of 1 and [`Bounces::Feedback`].
+    ///
+    /// Blocks take turns, the one that waits longest first. If n blocks need direct light, the last gets it after n /
+    /// `slice` frames, rounded up, and indirect light as many frames later: with 10 blocks a frame, 100 blocks take 10
+    /// frames, then 10 more. Meanwhile, a lamp that moved lights both its old and its new place. If the indirect light
+    /// of all blocks exceeds twice the most light that left the walls, all of it is scaled down until no block waits.
     pub slice: Option<NonZero<usize>>,
-    /// Who does the work.
+    /// Runs the work of a frame, on one thread or several.
     pub executor: Arc<dyn Executor>,
 }
 
 impl Default for FrameConfig {
-    /// The lightmap, one more bounce each frame, with the best instructions that the machine has, everything up to date,
-    /// on the caller's thread.
+    /// The lightmap, [`Bounces::Feedback`], the best vector instructions of the machine, all light up to date in every
+    /// frame, and the caller's thread.
     fn default() -> Self {
         Self {
             outputs: Outputs::default(),

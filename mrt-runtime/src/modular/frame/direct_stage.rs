@@ -1,6 +1,6 @@
 //! Direct light: only for blocks whose light may have changed.
 
-use crate::executor::{run_parts, task_count};
+use crate::executor::run_parts;
 use crate::light::beam::{Beam, BeamTracer};
 use crate::light::direct_light::add_beam::{TexelPlanes, add_beam};
 use crate::light::direct_light::{Shadows, add_exact, irradiance};
@@ -9,7 +9,7 @@ use crate::light::placed::PlacedLight;
 use crate::light::visibility::{Openings, Receiver, Visibility};
 use crate::modular::frame::config::FrameConfig;
 use crate::modular::frame::schedule::Schedule;
-use crate::modular::frame::split::{CutPlanes, part_of, span};
+use crate::modular::frame::split::{Cut, CutPlanes, parts_of};
 use crate::modular::scene::SceneData;
 use crate::output::texel_layout::{BlockRank, Planes};
 use glam::Vec3;
@@ -17,47 +17,47 @@ use mrt_core::simd::{Aligned, Kernel, Lanes, SimdLevel};
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// Beams that frames of a scene have room for: this many a block, and [`SPARE_BEAMS`] more, up to [`MAX_BEAMS`]. A light
-/// in a maze has about one a block that it reaches, one in an open hall of 30 x 30 blocks twelve. Where lights have more,
-/// texels ask for each light by itself: the same light, more slowly.
+/// A frame has room for `BEAMS_PER_BLOCK` beams for each block and [`SPARE_BEAMS`] more, up to [`MAX_BEAMS`]. A light
+/// has about one beam in each block that it reaches in a maze, and twelve in an open hall of 30 x 30 blocks. If the
+/// lights of a frame have more beams than fit, every texel tests each light: the same result, more slowly.
 const BEAMS_PER_BLOCK: usize = 12;
 /// See [`BEAMS_PER_BLOCK`].
 const SPARE_BEAMS: usize = 256;
-/// See [`BEAMS_PER_BLOCK`]; 19 MB.
+/// See [`BEAMS_PER_BLOCK`]. This many beams take 19 MB.
 const MAX_BEAMS: usize = 1 << 16;
 
-/// What the direct light that a frame holds was computed from, and what is still to be done.
+/// What the direct light of a frame was computed from, and which blocks still wait for theirs.
 #[derive(Debug)]
 pub(super) struct DirectStage {
-    /// Lights whose light there is, once no block waits.
+    /// The lights that direct light is computed from. It is up to date in blocks that do not wait.
     now: Vec<PlacedLight>,
     doors: Vec<f32>,
     tracer: BeamTracer,
-    /// Beams of the lights of `now`, light after light, and of each light where.
+    /// Beams of the lights in `now`, light after light, and the range of each light.
     beams: Vec<Beam>,
     beams_of: Vec<Range<usize>>,
-    /// The same of the frame that begins.
+    /// The same for the frame that begins.
     next_beams: Vec<Beam>,
     next_beams_of: Vec<Range<usize>>,
-    /// There was no room for all beams.
+    /// Whether there was no room for all beams.
     overflow: bool,
-    /// (block, beam) of the blocks in `list`, ascending.
-    hits: Vec<(BlockRank, u32)>,
+    /// The beams in each block of `list`, ascending.
+    hits: Vec<Hit>,
     is_listed: Vec<bool>,
-    /// [`Visibility::version`] of the one asked last.
+    /// [`Visibility::version`] in the last frame.
     version: Option<u64>,
     source: Source,
     /// Blocks that wait for direct light, oldest first.
     waiting: VecDeque<BlockRank>,
     is_waiting: Vec<bool>,
-    /// Blocks of this frame, ascending.
+    /// Blocks whose direct light this frame computes, ascending.
     list: Vec<BlockRank>,
     found: Vec<Found>,
-    /// New irradiance of a block, by task.
+    /// For each task: new irradiance of one block.
     scratch: Vec<Aligned<f32>>,
 }
 
-/// Where direct light came from.
+/// What computed the direct light of the last frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     Nowhere,
@@ -66,11 +66,21 @@ enum Source {
     Caller,
 }
 
-/// What was found out about a block's direct light.
+/// What a frame found about a block's direct light.
 #[derive(Clone, Copy, Debug, Default)]
 struct Found {
+    /// Largest change of irradiance, W/m².
     change: f32,
+    /// Largest irradiance, W/m².
     peak: f32,
+}
+
+/// A beam that lights a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Hit {
+    block: BlockRank,
+    /// Index of the beam.
+    beam: u32,
 }
 
 impl DirectStage {
@@ -99,7 +109,7 @@ impl DirectStage {
         }
     }
 
-    /// The next frame computes all direct light anew.
+    /// Makes the next frame compute all direct light again.
     pub(super) fn forget(&mut self) {
         self.now.clear();
         self.beams.clear();
@@ -107,8 +117,8 @@ impl DirectStage {
         self.source = Source::Nowhere;
     }
 
-    /// Traces lights that are not what they were, and lets blocks wait that those light, or did. Beams of the others are
-    /// kept if `keep`.
+    /// Traces the lights that changed, and makes the blocks wait that such a light reaches or reached before. Beams of
+    /// unchanged lights are kept if `keep`; otherwise all lights are traced.
     fn trace(&mut self, scene: &SceneData, next: &[PlacedLight], doors: &[f32], keep: bool) {
         self.next_beams.clear();
         self.next_beams_of.clear();
@@ -153,7 +163,7 @@ impl DirectStage {
         std::mem::swap(&mut self.beams_of, &mut self.next_beams_of);
     }
 
-    /// Takes over the beams of a light that is what it was.
+    /// Copies the beams of a light that did not change.
     fn keep_beams(&mut self, light: usize) {
         let range = self.beams_of[light].clone();
         let room = self.next_beams.capacity() - self.next_beams.len();
@@ -163,6 +173,7 @@ impl DirectStage {
         }
     }
 
+    /// Finds the beams of a light; sets `overflow` if there is no room for all.
     fn trace_light(&mut self, scene: &SceneData, index: usize, light: &PlacedLight, doors: &[f32]) {
         let (beams, overflow) = (&mut self.next_beams, &mut self.overflow);
         let emit = &mut |beam: &Beam| {
@@ -184,7 +195,10 @@ impl DirectStage {
         for (beam, at) in self.beams.iter().zip(0..) {
             let rank = scene.layout.rank[beam.block.get()];
             if self.is_listed[rank.get()] {
-                self.hits.push((rank, at));
+                self.hits.push(Hit {
+                    block: rank,
+                    beam: at,
+                });
             }
         }
         for &block in &self.list {
@@ -198,6 +212,7 @@ impl DirectStage {
         !self.waiting.is_empty()
     }
 
+    /// Makes a block wait for its direct light to be computed.
     fn wait_for(&mut self, block: BlockRank) {
         if !self.is_waiting[block.get()] {
             self.is_waiting[block.get()] = true;
@@ -205,7 +220,7 @@ impl DirectStage {
         }
     }
 
-    /// Lists the blocks whose turn it is, at most so many.
+    /// Moves the `most` oldest waiting blocks to the list of this frame.
     fn take(&mut self, most: usize) {
         self.list.clear();
         let count = most.min(self.waiting.len());
@@ -231,7 +246,7 @@ impl DirectStage {
             && version == self.version
             && self.doors == job.shadows.doors;
         if !same_source {
-            // Wherever there is light of another kind.
+            // Light of another kind must be replaced wherever there is some.
             self.beams_of.clear();
             for &block in &schedule.alive {
                 if schedule.state[block.get()].has_fresh() {
@@ -254,7 +269,7 @@ impl DirectStage {
         self.now.extend_from_slice(job.lights);
     }
 
-    /// Brings direct light up to date, for `job.most` blocks at most. Returns how many blocks were computed.
+    /// Brings the direct light of at most `job.most` blocks up to date. Returns how many blocks were computed.
     pub(super) fn update<V: Visibility>(
         &mut self,
         job: &DirectJob<'_, V>,
@@ -278,7 +293,7 @@ impl DirectStage {
         self.list.len()
     }
 
-    /// Computes direct light of the listed blocks.
+    /// Computes the direct light of the listed blocks.
     fn compute<V: Visibility>(
         &mut self,
         job: &DirectJob<'_, V>,
@@ -286,35 +301,25 @@ impl DirectStage {
         direct: &mut Planes,
     ) {
         let executor = &*job.config.executor;
-        let tasks = task_count(executor, self.list.len()).min(self.scratch.len());
         let mut planes = CutPlanes::new(direct);
-        let mut found = &mut self.found[..];
-        let mut gone = 0;
-        let mut scratch = self.scratch.iter_mut();
+        let mut found = Cut::new(&mut self.found, 1);
         let layout = &job.scene.layout;
-        let list = &self.list;
         let beams = LitBlocks {
             lights: &self.now,
             beams: &self.beams,
             hits: &self.hits,
         };
-        let parts = (0..tasks)
-            .map_while(|k| part_of(list, tasks, k).filter(|list| !list.is_empty()))
-            .filter_map(|list| {
-                let span = span(list);
-                let slots = layout.slots_of_span(&span);
-                let (_, rest) = std::mem::take(&mut found).split_at_mut(span.start - gone);
-                let (taken, rest) = rest.split_at_mut(span.len());
-                (found, gone) = (rest, span.end);
-                Some((list, taken, planes.take(slots), scratch.next()?))
-            });
-        run_parts(executor, parts, |(list, found, mut planes, scratch)| {
-            let span = span(list);
-            let first_slot = layout.slots[span.start].start;
-            for &block in list {
+        let parts = parts_of(&self.list, executor, &mut self.scratch).map(|part| {
+            let planes = planes.take(layout.slots_of_span(&part.span));
+            let found = found.take(part.span.clone());
+            (part, found, planes)
+        });
+        run_parts(executor, parts, |(part, found, mut planes)| {
+            let first_slot = layout.slots[part.span.start].start;
+            for &block in part.list {
                 let slots = layout.slots(block);
                 let count = slots.len();
-                let new = &mut scratch[..3 * count];
+                let new = &mut part.scratch[..3 * count];
                 if by_beams {
                     beams.light_block(job, block, new);
                 } else {
@@ -328,7 +333,7 @@ impl DirectStage {
                     result.change = result.change.max(channel.change);
                     result.peak = result.peak.max(channel.peak);
                 }
-                found[block.get() - span.start] = result;
+                found[block.get() - part.span.start] = result;
             }
         });
     }
@@ -369,13 +374,13 @@ impl DirectStage {
     }
 }
 
-/// What direct light of a frame depends on.
+/// What the direct light of a frame depends on.
 pub(super) struct DirectJob<'a, V> {
     pub scene: &'a SceneData,
     pub config: &'a FrameConfig,
     pub shadows: Shadows<'a, V>,
     pub lights: &'a [PlacedLight],
-    /// Blocks to compute, at most.
+    /// Most blocks to compute.
     pub most: usize,
 }
 
@@ -388,7 +393,7 @@ fn texels_of(scene: &SceneData, block: BlockRank) -> TexelPlanes<'_> {
     }
 }
 
-/// Direct light of one block, each texel and light asked for by itself.
+/// Direct light of one block, with a test of shadow for each texel and light.
 fn ask_for_block<V: Visibility>(
     job: &DirectJob<'_, V>,
     block: BlockRank,
@@ -416,12 +421,12 @@ fn ask_for_block<V: Visibility>(
     }
 }
 
-/// Beams, and which of them light which block.
+/// All beams, and which of them light each listed block.
 struct LitBlocks<'a> {
     lights: &'a [PlacedLight],
     beams: &'a [Beam],
-    /// (block, beam), ascending.
-    hits: &'a [(BlockRank, u32)],
+    /// Ascending.
+    hits: &'a [Hit],
 }
 
 impl LitBlocks<'_> {
@@ -434,18 +439,18 @@ impl LitBlocks<'_> {
     ) {
         out.fill(0.0);
         let hits = self.hits;
-        let start = hits.partition_point(|hit| hit.0 < block);
-        let end = start + hits[start..].partition_point(|hit| hit.0 == block);
+        let start = hits.partition_point(|hit| hit.block < block);
+        let end = start + hits[start..].partition_point(|hit| hit.block == block);
         let texels = texels_of(job.scene, block);
         let count = texels.normals[0].len();
         let (red, rest) = out.split_at_mut(count);
         let (green, blue) = rest.split_at_mut(count);
-        let beam = |hit: &(BlockRank, u32)| &self.beams[hit.1 as usize];
+        let beam = |hit: &Hit| &self.beams[hit.beam as usize];
         let simd: SimdLevel = job.config.simd;
         for of_light in hits[start..end].chunk_by(|a, b| beam(a).light == beam(b).light) {
             let light = &self.lights[beam(&of_light[0]).light as usize];
             let mut out = [&mut *red, &mut *green, &mut *blue];
-            // An exact beam stands for all of its light's.
+            // An exact beam replaces all beams of its light in the block.
             if of_light.iter().any(|hit| beam(hit).exact) {
                 let shadows = Shadows {
                     level: job.shadows.level,
@@ -464,7 +469,7 @@ impl LitBlocks<'_> {
     }
 }
 
-/// Writes new values over old ones.
+/// Replaces values, and finds the largest value and change.
 struct Replace<'a> {
     old: &'a mut [f32],
     new: &'a [f32],

@@ -1,29 +1,28 @@
-//! Bounces must not grow without end.
+//! A limit of flux that keeps bounces from growing without end.
 
 use crate::modular::frame::light_buffers::LightBuffers;
 use crate::modular::frame::schedule::Schedule;
 use crate::modular::scene::SceneData;
 
-/// Share by which more may arrive of direct light that left the walls, and of what they emit: irradiance is that at
-/// texel centres, whose mean differs from a wall's where light comes from nearby. At 3² texels that is 0.1 % for even
-/// light, and without it exact operators would be scaled, and lights not add up.
+/// More flux than left the walls may arrive, by this share of reflected direct light and emission. Irradiance is
+/// sampled at texel centres, and the mean of the samples differs from the mean over the wall where light comes from
+/// nearby: by 0.1 % for even light at 3² texels. Without this margin, exact operators would be scaled, and the light of
+/// several lamps would not add up.
 const SPOT_GAIN: f64 = 0.05;
 
-/// What arrived may be this many times the most that left, while blocks wait: a lamp that moves lights its old place and
-/// its new one, until both are up to date.
+/// While blocks wait, this many times the most flux that left the walls may arrive: a lamp that moved lights its old
+/// and its new place until both are up to date.
 const WAITING_GAIN: f64 = 2.0;
 
-/// Scales a channel down where more flux would arrive on all walls than left them.
+/// Scales a channel down if more flux arrives on all walls than left them. Returns how many channels were scaled.
 ///
-/// Exact transport never does that. Where truncated operators did, bounces would grow without end; so the flux of
-/// indirect light falls by the largest albedo at each bounce, whatever the level. Direct light and what walls emit
-/// have some [`SPOT_GAIN`]. Areas are those of the canonical blocks.
+/// Exact transport never needs it. With truncated operators, bounces could grow without end; with the limit, the flux
+/// of indirect light falls by the largest albedo at each bounce, in every level. Direct light and emission have a
+/// margin of [`SPOT_GAIN`]. Areas are those of the canonical blocks.
 ///
-/// While blocks wait for their light ([`FrameConfig::slice`](crate::modular::frame::config::FrameConfig)), what arrived is partly of earlier
-/// frames, and more than leaves now may be right. [`WAITING_GAIN`] times the most that left since nothing waited is then
-/// the limit.
-///
-/// Returns how many channels were scaled.
+/// While blocks wait for their light ([`FrameConfig::slice`](crate::modular::frame::config::FrameConfig::slice)), some
+/// of the flux that arrived is from earlier frames, and may rightly exceed the flux that leaves now. The limit is then
+/// [`WAITING_GAIN`] times the most flux that left the walls since no block waited.
 pub(super) fn limit_flux(
     scene: &SceneData,
     blocks: &mut Schedule,
@@ -32,12 +31,12 @@ pub(super) fn limit_flux(
 ) -> usize {
     let mut limited = 0;
     let layout = &scene.layout;
-    // Sums in one order, whichever blocks came to have light first.
+    // Sums always in the same order, whichever blocks were lit first.
     blocks.alive.sort_unstable();
     let (mut sent, mut arrived) = ([0.0; 3], [0.0; 3]);
     for &block in &blocks.alive {
         let state = &blocks.state[block.get()];
-        // What arrived may be of joint coefficients that were more.
+        // Light that was kept may be brighter than its present joint coefficients.
         let shape = &scene.shapes[layout.shape(block)];
         let lag = f64::from(state.lag * shape.area);
         for channel in 0..3 {

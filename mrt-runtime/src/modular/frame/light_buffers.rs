@@ -1,4 +1,4 @@
-//! The light that a frame holds, stage by stage.
+//! The light of a frame after each stage.
 
 use crate::executor::MAX_TASKS;
 use crate::modular::kernels::scratch::Scratch;
@@ -6,27 +6,27 @@ use crate::modular::scene::SceneData;
 use crate::output::texel_layout::Planes;
 use mrt_core::simd::Aligned;
 
-/// Buffers of a frame, made once for a scene.
+/// Buffers of the stages of a frame, allocated once for a scene.
 #[derive(Debug)]
 pub(super) struct LightBuffers {
     /// Direct irradiance, W/m², by slot.
     pub direct: Planes,
     /// Indirect irradiance, W/m², by slot.
     pub indirect: Planes,
-    /// Coefficients b, as [`CoefficientLayout`](crate::modular::scene::CoefficientLayout) says.
+    /// Coefficients b of all blocks, in the order of [`CoefficientLayout`](crate::modular::scene::CoefficientLayout).
     pub coefficients: Aligned<f32>,
-    /// Joint coefficients, in the same order.
+    /// Joint coefficients of all blocks, in the same order.
     pub joint: Aligned<f32>,
     /// Fraction of light that each door lets through.
     pub doors: Vec<f32>,
-    /// Product of the doors of each gate of the scene's transport.
+    /// For each gate of the scene's transport, the product of the values of its doors.
     pub gate_values: Vec<f32>,
-    /// One a task.
+    /// Memory of the kernels of each task.
     pub scratch: Vec<Scratch>,
 }
 
 impl LightBuffers {
-    /// Darkness, for so many tasks at once.
+    /// Dark buffers, with memory for `tasks` tasks that run in parallel.
     pub(super) fn new(scene: &SceneData, tasks: usize) -> Self {
         let slots = scene.layout.slot_count();
         let coefficients = scene.rows.per_block();
@@ -43,7 +43,7 @@ impl LightBuffers {
         }
     }
 
-    /// Tasks that an executor of so many workers may run at once.
+    /// Most tasks that an executor with `workers` workers runs in parallel.
     pub(super) fn task_count(workers: usize) -> usize {
         match workers {
             0 | 1 => 1,

@@ -1,4 +1,4 @@
-//! Lightmap, probes and vector irradiance: filled where indirect light was written.
+//! Fills lightmap, probes and vector irradiance of blocks whose indirect light changed.
 
 use crate::modular::frame::config::FrameConfig;
 use crate::modular::frame::light_buffers::LightBuffers;
@@ -11,18 +11,28 @@ use crate::output::probes::Probes;
 use crate::output::texel_layout::BlockRank;
 use mrt_core::simd::SimdLevel;
 
-/// What a frame gives besides irradiance at texels.
+/// The outputs of a frame besides irradiance at texels.
 #[derive(Debug)]
 pub(super) struct OutputBuffers {
-    /// Empty if not asked for.
+    /// Pixels of the atlas; empty if not asked for.
     pub lightmap: Vec<[f32; 3]>,
     pub probes: Option<Probes>,
-    /// Four coefficients a texel, three channels; empty if not asked for.
+    /// Four coefficients for each texel and channel; empty if not asked for.
     pub vector: Vec<f32>,
 }
 
+/// The last part of a frame: from light at texels and joint coefficients to outputs.
+pub(super) struct OutputStage<'a> {
+    pub scene: &'a SceneData,
+    pub config: &'a FrameConfig,
+    pub schedule: &'a mut Schedule,
+    pub light: &'a mut LightBuffers,
+    pub report: &'a mut ReportData,
+    pub clock: &'a mut StageClock,
+}
+
 impl OutputBuffers {
-    /// Darkness in everything asked for that the dictionary was baked with.
+    /// Dark outputs: those that the settings ask for and the dictionary was baked with.
     pub(super) fn new(scene: &SceneData, config: &FrameConfig) -> Self {
         let outputs = config.outputs;
         let pixels = if outputs.lightmap {
@@ -44,7 +54,7 @@ impl OutputBuffers {
         }
     }
 
-    /// Takes all light from probes and vector irradiance.
+    /// Sets probes and vector irradiance to 0.
     pub(super) fn darken(&mut self) {
         self.vector.fill(0.0);
         if let Some(probes) = &mut self.probes {
@@ -52,16 +62,16 @@ impl OutputBuffers {
         }
     }
 
-    /// Brings everything up to date for the blocks that changed, and lists them.
-    pub(super) fn fill(
-        &mut self,
-        scene: &SceneData,
-        config: &FrameConfig,
-        schedule: &mut Schedule,
-        light: &mut LightBuffers,
-        report: &mut ReportData,
-        clock: &mut StageClock,
-    ) {
+    /// Brings the outputs of all changed blocks up to date, and lists those blocks in the report.
+    pub(super) fn fill(&mut self, stage: OutputStage<'_>) {
+        let OutputStage {
+            scene,
+            config,
+            schedule,
+            light,
+            report,
+            clock,
+        } = stage;
         schedule.changed.sort_unstable();
         let changed = &schedule.changed;
         let order = &scene.layout.order;

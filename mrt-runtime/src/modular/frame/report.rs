@@ -1,4 +1,4 @@
-//! What a frame says about itself.
+//! The report of a frame.
 
 use crate::level::block_index::BlockIndex;
 use crate::modular::frame::light_list::SkippedLight;
@@ -7,7 +7,7 @@ use crate::modular::frame::stage_clock::StageTimes;
 use crate::output::lightmap_atlas::{LightmapAtlas, Tile};
 use std::sync::Arc;
 
-/// Blocks that a frame worked on, each once a pass.
+/// Numbers of blocks that a frame worked on; a block counts once in each pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameWork {
     /// Blocks whose direct light was computed.
@@ -16,69 +16,67 @@ pub struct FrameWork {
     pub sources: usize,
     /// Blocks whose indirect light was computed.
     pub targets: usize,
-    /// Blocks that changed light was sent to, but whose own light changes by no more than
-    /// [`FrameConfig::tolerance`](crate::modular::frame::config::FrameConfig::tolerance) and therefore stays as it was.
+    /// Blocks that changed light was sent to, but whose own light would change by no more than
+    /// [`FrameConfig::tolerance`](crate::modular::frame::config::FrameConfig::tolerance), and therefore stayed the
+    /// same.
     pub kept: usize,
-    /// Channels that were scaled down because more light arrived in them than left; the next frame then computes all
-    /// blocks anew.
+    /// Colour channels that were scaled down because more light arrived than left. The next pass then computes all
+    /// blocks again.
     pub limited: usize,
 }
 
-/// What a frame did: lights left out, light that changed, and the work behind it.
+/// What a solve did: lights that were skipped, blocks and tiles that changed, and the work that it took.
 ///
-/// A report is a snapshot that outlives the next frame. Frames allocate nothing as long as the report of the frame
-/// before has been dropped by then.
+/// Later solves do not change a report. A solve allocates a new one if the previous report still exists.
 #[derive(Clone, Debug)]
 pub struct FrameReport(Arc<ReportData>);
 
 impl FrameReport {
-    /// Lights that did not shine in this frame, and why: values out of range, or a place in no block. All others did.
+    /// Lights that did not shine in this frame, and why. All other lights did.
     pub fn skipped_lights(&self) -> &[SkippedLight] {
         &self.0.skipped
     }
 
-    /// The first light that did not shine, as an error: for tools, whose lights must all shine.
+    /// Fails if a light did not shine: for tools, whose lights must all shine.
     ///
     /// # Errors
-    /// [`SkippedLight`], if there is one.
+    /// The first [`SkippedLight`].
     pub fn require_all_lights(&self) -> Result<(), SkippedLight> {
         self.0.skipped.first().map_or(Ok(()), |&light| Err(light))
     }
 
-    /// Blocks whose indirect light was written, in no order; what [`Frame::probes`](crate::modular::frame::Frame::probes)
-    /// has for all others is as it was.
+    /// Blocks whose indirect light was written, in no particular order. The light of all other blocks, in
+    /// [`Frame::probes`](crate::modular::frame::Frame::probes) too, is unchanged.
     pub fn changed_blocks(&self) -> &[BlockIndex] {
         &self.0.blocks
     }
 
-    /// Tiles of the lightmap that were written, ascending; all others are as they were. None without a lightmap.
+    /// Tiles of the lightmap that were written, in ascending order; all other tiles are unchanged. Empty without a
+    /// lightmap.
     pub fn changed_tiles(&self) -> impl ExactSizeIterator<Item = Tile> + '_ {
         let (columns, size) = (self.0.columns.max(1), self.0.tile_size);
-        self.0.tiles.iter().map(move |&tile| Tile {
-            x: tile as usize % columns * size,
-            y: tile as usize / columns * size,
-            size,
-        })
+        let tiles = self.0.tiles.iter();
+        tiles.map(move |&tile| Tile::of_grid(tile as usize, columns, size))
     }
 
-    /// Blocks that the frame worked on.
+    /// Numbers of blocks that the frame worked on.
     pub fn work(&self) -> FrameWork {
         self.0.work
     }
 
-    /// Passes over the reduced operators: one for each bounce that was computed.
+    /// Number of passes over the reduced operators: one for each bounce that was computed.
     pub fn passes(&self) -> u32 {
         self.0.passes
     }
 
-    /// Time that each stage took, summed over the passes.
+    /// Time of each stage, summed over the passes.
     #[cfg(feature = "timing")]
     pub fn times(&self) -> StageTimes {
         self.0.times
     }
 }
 
-/// The data of a report, before it is given away.
+/// The data of a report.
 #[derive(Debug, Default)]
 pub(super) struct ReportData {
     pub skipped: Vec<SkippedLight>,
@@ -92,7 +90,7 @@ pub(super) struct ReportData {
     tile_size: usize,
 }
 
-/// Reports of a frame, whose memory is used again.
+/// Makes the reports of a frame, and uses their memory again.
 #[derive(Debug)]
 pub(super) struct ReportSlot {
     last: Arc<ReportData>,
@@ -103,7 +101,7 @@ pub(super) struct ReportSlot {
 }
 
 impl ReportSlot {
-    /// For scenes of so many blocks.
+    /// For a scene with `blocks` blocks.
     pub(super) fn new(blocks: usize, atlas: &LightmapAtlas) -> Self {
         let mut slot = Self {
             last: Arc::default(),
@@ -118,7 +116,7 @@ impl ReportSlot {
 
     /// An empty report to fill in.
     pub(super) fn begin(&mut self) -> &mut ReportData {
-        // The caller still has the last one: it stays as it is.
+        // The caller still has the last report, which must not change.
         if Arc::get_mut(&mut self.last).is_none() {
             self.last = Arc::new(self.empty());
         }
@@ -141,12 +139,12 @@ impl ReportSlot {
         data
     }
 
-    /// The report that [`ReportSlot::begin`] gave to fill in.
+    /// The report of the present solve. [`ReportSlot::begin`] must come before.
     pub(super) fn data(&mut self) -> &mut ReportData {
         Arc::get_mut(&mut self.last).expect("a report is given away only when it is finished")
     }
 
-    /// Gives away what [`ReportSlot::begin`] gave to fill in.
+    /// The finished report, for the caller.
     pub(super) fn finish(&self) -> FrameReport {
         FrameReport(self.last.clone())
     }

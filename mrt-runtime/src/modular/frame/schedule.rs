@@ -1,18 +1,18 @@
-//! Which blocks a frame works on. Lists name the blocks that count: no step looks at all blocks unless an eighth of them
-//! is to be computed.
+//! Which blocks a frame works on. Every step goes over a list of the blocks that matter to it; none looks at all blocks
+//! unless at least an eighth of them must be computed.
 
 use crate::modular::kernels::indirect::Arrived;
 use crate::modular::kernels::scratch::Flux;
 use crate::output::texel_layout::BlockRank;
 use std::collections::VecDeque;
 
-/// What is known about the blocks of a scene, by rank.
+/// What a frame knows about the blocks of its scene, by rank, and its lists of blocks.
 #[derive(Debug)]
 pub(super) struct Schedule {
     pub state: Vec<BlockState>,
-    /// Whether a block's coefficients b are not all zero.
+    /// By rank: whether the block has a coefficient b that is not zero.
     pub has_coefficients: Vec<bool>,
-    /// Number of those that light was sent out from.
+    /// Number of blocks that sent light out.
     pub lit: usize,
     /// Blocks with light of any kind, ascending.
     pub alive: Vec<BlockRank>,
@@ -22,39 +22,39 @@ pub(super) struct Schedule {
     pub targets: Vec<BlockRank>,
     /// Blocks whose indirect light is not up to date, oldest first.
     pub waiting: VecDeque<BlockRank>,
-    /// The most flux that left all walls in a pass since none waited.
+    /// The most flux that left all walls in one pass since no block waited.
     pub most_sent: Flux,
-    /// Blocks whose indirect light was written since outputs were.
+    /// Blocks whose indirect light was written since the last outputs.
     pub changed: Vec<BlockRank>,
     pub doors_moved: bool,
-    /// The frame before cannot be gone on from: all blocks with light are computed anew.
+    /// Whether nothing of the previous pass can be kept: all blocks with light are computed again.
     pub all_stale: bool,
     pub kept: Kept,
 }
 
-/// What is known about one block.
+/// What a frame knows about one block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BlockState {
     pub has_direct: bool,
     pub emits: bool,
     pub has_indirect: bool,
-    /// Whether its coefficients were not all zero when light was last sent out.
+    /// Whether a coefficient was not zero when light was last sent out.
     pub had_coefficients: bool,
-    /// Irradiance, W/m², by which its light may have changed since its coefficients were computed.
+    /// Largest change of irradiance, W/m², that may have happened since its coefficients were computed.
     pub stale: f32,
     /// Flux that left its walls when its coefficients were computed.
     pub sent: Flux,
-    /// The part of it that is direct light and emission.
+    /// The part of `sent` that is reflected direct light, and emission.
     pub fresh: Flux,
-    /// Indirect flux that arrived.
+    /// Indirect flux that arrived at its walls.
     pub arrived: Flux,
-    /// Largest indirect irradiance.
+    /// Largest indirect irradiance, W/m².
     pub peak: f32,
-    /// Its light may differ by so much, W/m², from what joint coefficients now are.
+    /// Largest difference, W/m², between its light and the light of its present joint coefficients.
     pub lag: f32,
-    /// The joint coefficients of the pass under way are kept as they were.
+    /// Whether the present pass keeps its old joint coefficients.
     pub is_kept: bool,
-    /// What the pass under way found.
+    /// Light that arrives in the present pass.
     pub arrives: Arrived,
     pub is_alive: bool,
     pub is_waiting: bool,
@@ -62,26 +62,26 @@ pub(super) struct BlockState {
 }
 
 impl BlockState {
-    /// True if the block has light that does not come from other blocks.
+    /// True if the block has direct light or emits.
     pub(super) fn has_fresh(&self) -> bool {
         self.has_direct || self.emits
     }
 }
 
-/// What the frame before left behind.
+/// What a frame can keep of the previous one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub(super) enum Kept {
-    /// Nothing to go on from.
+    /// Nothing.
     #[default]
     Nothing,
     /// Light of one bounce.
     Once,
-    /// Light of many, one more each frame.
+    /// Light of many bounces, one more in each frame.
     Feedback,
 }
 
 impl Schedule {
-    /// Everything is dark; blocks of which `emits` is true send light out in the first frame.
+    /// All blocks are dark. Blocks with `emits` send light out in the first frame.
     pub(super) fn new(emits: &[bool]) -> Self {
         let count = emits.len();
         let mut schedule = Self {
@@ -106,7 +106,7 @@ impl Schedule {
         schedule
     }
 
-    /// A block's light changed by up to so much.
+    /// Notes that a block's irradiance changed by at most `change`, W/m².
     pub(super) fn touch(&mut self, block: BlockRank, change: f32) {
         let state = &mut self.state[block.get()];
         state.stale += change;
@@ -116,7 +116,7 @@ impl Schedule {
         }
     }
 
-    /// A block's indirect light is to be computed.
+    /// Makes a block wait for its indirect light to be computed.
     pub(super) fn await_light(&mut self, block: BlockRank) {
         let state = &mut self.state[block.get()];
         if !state.is_waiting {
@@ -125,10 +125,10 @@ impl Schedule {
         }
     }
 
-    /// Makes the first so many waiting blocks the targets.
+    /// Makes the `count` blocks that wait longest the targets.
     pub(super) fn take_targets(&mut self, count: usize) {
         self.targets.clear();
-        // Looking at all flags takes less than sorting, unless few are set.
+        // Unless few blocks wait, looking at all flags takes less time than sorting.
         if count == self.waiting.len() && count * 8 >= self.state.len() {
             self.waiting.clear();
             for (rank, state) in self.state.iter_mut().enumerate() {
@@ -145,7 +145,7 @@ impl Schedule {
         self.targets.sort_unstable();
     }
 
-    /// A block's indirect light was written.
+    /// Notes that a block's indirect light was written.
     pub(super) fn mark_changed(&mut self, block: BlockRank) {
         let state = &mut self.state[block.get()];
         if !state.is_changed {
@@ -154,14 +154,15 @@ impl Schedule {
         }
     }
 
+    /// Empties the list of changed blocks.
     pub(super) fn clear_changed(&mut self) {
         for block in self.changed.drain(..) {
             self.state[block.get()].is_changed = false;
         }
     }
 
-    /// Lists the blocks whose coefficients b are to be computed: all with light if `all`, otherwise those whose light may
-    /// have changed by more than `tolerance`.
+    /// Lists the blocks whose coefficients b must be computed: all blocks with light if `all`, otherwise those whose
+    /// irradiance may have changed by more than `tolerance`, W/m².
     pub(super) fn take_sources(&mut self, all: bool, tolerance: f32) {
         self.alive.sort_unstable();
         self.sources.clear();
@@ -172,7 +173,7 @@ impl Schedule {
         }
     }
 
-    /// Notes that a block's coefficients were computed. True if it sends light out, or did before.
+    /// Notes that a block's coefficients were computed. True if the block sends light out, or sent light out before.
     pub(super) fn note_sent(&mut self, block: BlockRank) -> bool {
         let state = &mut self.state[block.get()];
         state.stale = 0.0;
@@ -183,7 +184,7 @@ impl Schedule {
         had || has
     }
 
-    /// Takes the blocks from the targets whose joint coefficients were kept. Returns how many.
+    /// Removes the blocks from the targets that keep their old joint coefficients. Returns how many there were.
     pub(super) fn drop_kept_targets(&mut self) -> usize {
         let state = &self.state;
         let before = self.targets.len();
@@ -191,7 +192,7 @@ impl Schedule {
         before - self.targets.len()
     }
 
-    /// Notes what arrived at the targets. Returns the largest change of irradiance, W/m².
+    /// Notes the light that arrived at the targets. Returns the largest change of irradiance, W/m².
     pub(super) fn note_arrivals(&mut self) -> f32 {
         let mut change = 0.0f32;
         for k in 0..self.targets.len() {
@@ -202,7 +203,7 @@ impl Schedule {
             state.peak = arrived.peak;
             state.has_indirect = arrived.peak > 0.0;
             change = change.max(arrived.change);
-            // With one bounce, indirect light does not change what is sent out.
+            // With one bounce, indirect light is not sent out again.
             let resent = if self.kept == Kept::Once {
                 0.0
             } else {
@@ -214,13 +215,13 @@ impl Schedule {
         change
     }
 
-    /// The largest indirect irradiance, W/m².
+    /// The largest indirect irradiance of all blocks, W/m².
     pub(super) fn peak(&self) -> f32 {
         let peaks = self.alive.iter().map(|block| self.state[block.get()].peak);
         peaks.fold(0.0, f32::max)
     }
 
-    /// Drops blocks without any light from the list of those that have some.
+    /// Removes blocks without any light from `alive`.
     pub(super) fn forget_dark(&mut self) {
         let state = &mut self.state;
         self.alive.retain(|&block| {

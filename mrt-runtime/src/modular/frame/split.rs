@@ -1,13 +1,15 @@
-//! Cuts buffers into the parts of tasks that run at the same time.
+//! Divides lists and buffers among tasks that run in parallel.
 
+use crate::executor::{Executor, task_count};
 use crate::output::texel_layout::{BlockRank, Planes};
+use std::ops::Range;
 
-/// A slice that is given away from the front, block by block.
+/// A slice that is given away from the front, a range of blocks at a time.
 pub(super) struct Cut<'a, T> {
     rest: &'a mut [T],
-    /// Blocks that are gone.
+    /// Number of blocks that are no longer in `rest`.
     given: usize,
-    /// Elements a block.
+    /// Elements of each block.
     size: usize,
 }
 
@@ -20,8 +22,8 @@ impl<'a, T> Cut<'a, T> {
         }
     }
 
-    /// The elements of these blocks; what was before them is lost.
-    pub(super) fn take(&mut self, blocks: std::ops::Range<usize>) -> &'a mut [T] {
+    /// The elements of a range of blocks. Ranges must ascend: elements before them are no longer available.
+    pub(super) fn take(&mut self, blocks: Range<usize>) -> &'a mut [T] {
         let rest = std::mem::take(&mut self.rest);
         let (_, rest) = rest.split_at_mut((blocks.start - self.given) * self.size);
         let (taken, rest) = rest.split_at_mut(blocks.len() * self.size);
@@ -31,7 +33,7 @@ impl<'a, T> Cut<'a, T> {
     }
 }
 
-/// [`Planes`], given away by ranges of slots.
+/// [`Planes`] that are given away from the front, a range of slots at a time.
 pub(super) struct CutPlanes<'a>([Cut<'a, f32>; 3]);
 
 impl<'a> CutPlanes<'a> {
@@ -39,7 +41,7 @@ impl<'a> CutPlanes<'a> {
         Self(planes.channels_mut().map(|channel| Cut::new(channel, 1)))
     }
 
-    pub(super) fn take(&mut self, slots: std::ops::Range<usize>) -> [&'a mut [f32]; 3] {
+    pub(super) fn take(&mut self, slots: Range<usize>) -> [&'a mut [f32]; 3] {
         let [red, green, blue] = &mut self.0;
         [
             red.take(slots.clone()),
@@ -49,15 +51,31 @@ impl<'a> CutPlanes<'a> {
     }
 }
 
-/// Part number `k` of `tasks` of an ascending list.
-pub(super) fn part_of(list: &[BlockRank], tasks: usize, k: usize) -> Option<&[BlockRank]> {
-    (k < tasks).then(|| &list[k * list.len() / tasks..(k + 1) * list.len() / tasks])
+/// The work of one task.
+pub(super) struct Part<'a, S> {
+    /// The blocks, ascending; at least one.
+    pub list: &'a [BlockRank],
+    /// All ranks from the first block of the list to the last.
+    pub span: Range<usize>,
+    /// Memory of the task.
+    pub scratch: &'a mut S,
 }
 
-/// Blocks from the first of a list to its last.
-pub(super) fn span(list: &[BlockRank]) -> std::ops::Range<usize> {
-    match (list.first(), list.last()) {
-        (Some(&first), Some(&last)) => first.get()..last.get() + 1,
-        _ => 0..0,
-    }
+/// Divides an ascending list into parts of about the same length, at most one for each element of `scratch`.
+pub(super) fn parts_of<'a, S>(
+    list: &'a [BlockRank],
+    executor: &dyn Executor,
+    scratch: &'a mut [S],
+) -> impl Iterator<Item = Part<'a, S>> {
+    let tasks = task_count(executor, list.len()).min(scratch.len());
+    let lists =
+        (0..tasks).map(move |k| &list[k * list.len() / tasks..(k + 1) * list.len() / tasks]);
+    lists.zip(scratch).filter_map(|(list, scratch)| {
+        let (first, last) = (list.first()?, list.last()?);
+        Some(Part {
+            list,
+            span: first.get()..last.get() + 1,
+            scratch,
+        })
+    })
 }

@@ -1,4 +1,4 @@
-//! How long each stage of a frame takes. Without the feature `timing` nothing is measured and no clock is asked.
+//! Measures each stage of a frame. Without the feature `timing`, nothing is measured and no clock is read.
 
 #[cfg(feature = "timing")]
 use std::time::Duration;
@@ -51,7 +51,7 @@ pub(super) enum Stage {
     Vector,
 }
 
-/// Gives the time since the last call to a stage.
+/// Adds up the time of each stage.
 #[derive(Debug)]
 pub(super) struct StageClock {
     #[cfg(feature = "timing")]
@@ -69,7 +69,7 @@ impl StageClock {
         }
     }
 
-    /// What happened since the last call was this stage.
+    /// Adds the time since the last call, or since the start, to a stage.
     pub(super) fn lap(&mut self, stage: Stage) {
         let now = Instant::now();
         let time = match stage {

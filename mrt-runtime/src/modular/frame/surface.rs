@@ -1,4 +1,4 @@
-//! What walls reflect and emit, which a game may change while it runs.
+//! Albedo and emission of walls, which a game may change while it runs.
 
 use crate::level::block_index::BlockIndex;
 use crate::light::limits::MAX_LIGHT_VALUE;
@@ -7,21 +7,21 @@ use crate::output::texel_layout::{BlockRank, Planes};
 use glam::Vec3;
 use mrt_core::geometry::cube::Face;
 
-/// Colours of the texels of a level, by slot. Slots without a texel, and texels in holes, have none.
+/// Colours of the texels of a level, by slot. Slots without a texel and texels in holes are black.
 #[derive(Clone, Debug)]
 pub(super) struct Surface {
     /// Linear RGB albedo.
     pub albedo: Planes,
-    /// By rank: the albedo of all texels of a block, if they have the same.
+    /// By rank: the albedo of the block's texels, if it is the same for all.
     pub uniform: Vec<Option<Vec3>>,
-    /// Radiosity that texels emit of themselves, linear RGB, W/m².
+    /// Radiosity that texels emit, linear RGB, W/m².
     pub emission: Planes,
 }
 
 /// Why the surface of a block was not changed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum SurfaceError {
-    /// No such block.
+    /// There is no such block.
     #[error("block {found}; expected an index below {expected}")]
     Block {
         /// Number of blocks.
@@ -34,11 +34,11 @@ pub enum SurfaceError {
     Length {
         /// Which block.
         block: BlockIndex,
-        /// What was to be set.
+        /// Property that was to be set.
         what: &'static str,
-        /// Texels of the block.
+        /// Number of texels of the block.
         expected: usize,
-        /// Values given.
+        /// Number of values given.
         found: usize,
     },
     /// A value is negative, too large or NaN.
@@ -48,11 +48,11 @@ pub enum SurfaceError {
     Value {
         /// Which block.
         block: BlockIndex,
-        /// Which texel of it.
+        /// Which texel of the block.
         texel: usize,
-        /// What was to be set.
+        /// Property that was to be set.
         what: &'static str,
-        /// Largest accepted.
+        /// Largest value accepted.
         largest: f32,
         /// The value given.
         found: Vec3,
@@ -60,7 +60,7 @@ pub enum SurfaceError {
 }
 
 impl Surface {
-    /// The colours that the level gives its faces, and by rank whether a block emits.
+    /// The colours that the level gives its faces; and, by rank, whether each block emits.
     pub(super) fn new(scene: &SceneData) -> (Self, Vec<bool>) {
         let layout = &scene.layout;
         let mut surface = Self {
@@ -89,20 +89,20 @@ impl Surface {
         block: BlockIndex,
         albedo: &[Vec3],
     ) -> Result<BlockRank, SurfaceError> {
-        check(scene, block, albedo, ("albedo", 1.0))?;
+        check(scene, block, albedo, Allowed::ALBEDO)?;
         let rank = write(scene, block, albedo, &mut self.albedo);
         self.find_uniform(scene, rank);
         Ok(rank)
     }
 
-    /// Lets each texel of a block emit radiosity of its own.
+    /// Gives each texel of a block an emission of its own.
     pub(super) fn set_emission(
         &mut self,
         scene: &SceneData,
         block: BlockIndex,
         emission: &[Vec3],
     ) -> Result<BlockRank, SurfaceError> {
-        check(scene, block, emission, ("emission", MAX_LIGHT_VALUE))?;
+        check(scene, block, emission, Allowed::EMISSION)?;
         Ok(write(scene, block, emission, &mut self.emission))
     }
 
@@ -113,7 +113,7 @@ impl Surface {
     }
 }
 
-/// Writes colours of the texels that are not in holes; the block and the number of values have been checked.
+/// Writes colours of the texels that are not in holes; the caller has checked the block and the number of values.
 fn write(scene: &SceneData, block: BlockIndex, values: &[Vec3], plane: &mut Planes) -> BlockRank {
     let rank = scene.layout.rank[block.get()];
     for (slot, texel, _) in wall_slots(scene, rank) {
@@ -122,8 +122,8 @@ fn write(scene: &SceneData, block: BlockIndex, values: &[Vec3], plane: &mut Plan
     rank
 }
 
-/// Slots of a block that show a wall, with the texel and its face. A texel that lies on a mirror has several slots; what is
-/// in a hole neither reflects nor emits.
+/// Slots of a block whose texel is on a wall, with the texel and its face. A texel on the plane of a mirror has several
+/// slots. Texels in holes are left out: they neither reflect nor emit.
 fn wall_slots(
     scene: &SceneData,
     rank: BlockRank,
@@ -139,12 +139,30 @@ fn wall_slots(
     })
 }
 
-/// Checks values named `what`, each channel of which is to be in [0, `largest`].
+/// A property of texels, each channel of which is in [0, `largest`].
+#[derive(Clone, Copy)]
+struct Allowed {
+    what: &'static str,
+    largest: f32,
+}
+
+impl Allowed {
+    const ALBEDO: Self = Self {
+        what: "albedo",
+        largest: 1.0,
+    };
+    const EMISSION: Self = Self {
+        what: "emission",
+        largest: MAX_LIGHT_VALUE,
+    };
+}
+
+/// Checks that a block exists, and that it can have these values.
 fn check(
     scene: &SceneData,
     block: BlockIndex,
     values: &[Vec3],
-    (what, largest): (&'static str, f32),
+    Allowed { what, largest }: Allowed,
 ) -> Result<(), SurfaceError> {
     let placed = scene.level.block(block).ok_or(SurfaceError::Block {
         found: block,

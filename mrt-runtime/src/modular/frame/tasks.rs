@@ -1,5 +1,5 @@
-//! The stages of a pass over lists of blocks, one kernel a task: small blocks have little more to compute than a call of
-//! a kernel costs.
+//! The stages of a pass over lists of blocks. A kernel is called once for each task, not for each block: a small block
+//! takes little more time than the call of a kernel.
 
 use crate::modular::frame::schedule::BlockState;
 use crate::modular::frame::surface::Surface;
@@ -11,14 +11,14 @@ use crate::modular::scene::SceneData;
 use crate::output::texel_layout::{BlockRank, Planes};
 use mrt_core::simd::{Kernel, Lanes};
 
-/// Coefficients b of a list of blocks, one task: its slices hold everything between the first block and the last.
+/// Computes coefficients b of a list of blocks. Mutable slices hold all blocks from the first of the list to the last.
 pub(super) struct Senders<'a> {
     pub scene: &'a SceneData,
     pub surface: &'a Surface,
     pub list: &'a [BlockRank],
     pub first: usize,
     pub direct: &'a Planes,
-    /// None where it is not reflected.
+    /// `None` if indirect light is not reflected.
     pub indirect: Option<&'a Planes>,
     pub coefficients: &'a mut [f32],
     pub flags: &'a mut [bool],
@@ -65,7 +65,8 @@ impl Kernel for Senders<'_> {
     }
 }
 
-/// Joint coefficients of a list of blocks, one task.
+/// Computes joint coefficients of a list of blocks. Mutable slices hold all blocks from the first of the list to the
+/// last.
 pub(super) struct Receivers<'a> {
     pub scene: &'a SceneData,
     pub list: &'a [BlockRank],
@@ -115,8 +116,8 @@ impl Kernel for Receivers<'_> {
             let now = &self.scratch.joint[..];
             let before = &*kept;
             let change = ChangeOf { shape, before, now }.run(l);
-            // Always store a block that becomes fully dark, even within tolerance. Rows beyond the shape's own are left from
-            // another block.
+            // Always store a block that becomes fully dark, even within tolerance. Rows beyond those of the shape still
+            // hold numbers of another block.
             let is_dark = |row: &[f32]| row[..shape.rows].iter().all(|&r| r == 0.0);
             let goes_dark = change > 0.0 && now.chunks_exact(self.scene.rows.count).all(is_dark);
             if change <= most && !goes_dark {
@@ -128,7 +129,7 @@ impl Kernel for Receivers<'_> {
     }
 }
 
-/// Indirect light of a list of blocks, one task.
+/// Computes indirect light of a list of blocks. Mutable slices hold all blocks from the first of the list to the last.
 pub(super) struct Unfolding<'a> {
     pub scene: &'a SceneData,
     pub list: &'a [BlockRank],

@@ -6,7 +6,7 @@ use crate::modular::packed::shape::PackedShape;
 use glam::Vec3;
 use mrt_core::simd::folded::{Albedo, Reflected, fold};
 use mrt_core::simd::rows::{DOT_ROWS, dot_rows, dot_unlike_rows};
-use mrt_core::simd::tiles::{CHANNELS, Element};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber};
 use mrt_core::simd::{Kernel, Lanes};
 
 /// `b = T_d->b (albedo (direct + indirect) + emission)` of one block.
@@ -15,20 +15,20 @@ pub(crate) struct CoefficientsOf<'a> {
     pub direct: [&'a [f32]; CHANNELS],
     pub indirect: Option<[&'a [f32]; CHANNELS]>,
     pub albedo: [&'a [f32]; CHANNELS],
-    /// The albedo of all texels, if they have the same.
+    /// The albedo of all texels, if it is the same for all.
     pub uniform: Option<Vec3>,
     pub emission: Option<[&'a [f32]; CHANNELS]>,
     pub scratch: &'a mut Scratch,
-    /// Channel by channel; numbers at rows that belong to none of them are zero, and stay so.
+    /// Output, channel by channel. Rows without a coefficient b are zero, and stay zero.
     pub coefficients: &'a mut [f32],
 }
 
-/// What left a block's walls.
+/// Flux that left the walls of a block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sent {
-    /// All of it.
+    /// All flux.
     pub all: Flux,
-    /// Reflected direct light, and emission.
+    /// The part that is reflected direct light, and emission.
     pub fresh: Flux,
 }
 
@@ -53,7 +53,7 @@ impl Kernel for CoefficientsOf<'_> {
 }
 
 impl CoefficientsOf<'_> {
-    /// The albedo that sums are multiplied by, instead of each texel's light.
+    /// The albedo that multiplies sums of light, where no texel's light needs to be multiplied; `None` otherwise.
     #[inline(always)]
     fn later(&self) -> Option<[f32; CHANNELS]> {
         match (self.uniform, self.emission) {
@@ -88,7 +88,7 @@ fn fold_block<L: Lanes, const GROUP: usize>(l: L, block: &mut CoefficientsOf<'_>
 }
 
 #[inline(always)]
-fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
+fn coefficients<L: Lanes, E: PackedNumber>(l: L, rows: &[E], block: &mut CoefficientsOf<'_>) {
     let stride = block.shape.folding.stride;
     let place = block.coefficients.len() / CHANNELS;
     let albedo = block.later().unwrap_or([1.0; CHANNELS]);
@@ -119,7 +119,7 @@ fn coefficients<L: Lanes, E: Element>(l: L, rows: &[E], block: &mut Coefficients
                     to[usize::from(row)] = scaled;
                 }
             } else {
-                // A group of fewer rows writes zeros to those that follow; their own groups come later.
+                // A group that is not full writes zeros to the rows after it; the groups of those rows come later.
                 let first = usize::from(group.rows[0]);
                 to[first..first + DOT_ROWS].copy_from_slice(&scaled);
             }

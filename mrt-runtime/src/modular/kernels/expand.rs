@@ -1,19 +1,19 @@
-//! A basis without mirrors times joint coefficients, one block at a time: probes and vector irradiance.
+//! A basis that is not folded by mirrors times joint coefficients, one block at a time: probes and vector irradiance.
 
 use crate::modular::kernels::scratch::{Scratch, scale_joint};
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::Tiled;
-use mrt_core::simd::tiles::{CHANNELS, Element, Rgb, TILE, Term, sum_tile};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber, Rgb, TILE, Term, sum_tile};
 use mrt_core::simd::{Kernel, Lanes, WIDEST};
 
-/// A tiled basis times joint coefficients: row after row, channel by channel.
+/// Multiplies a tiled basis by joint coefficients.
 pub(crate) struct Expand<'a> {
     pub basis: &'a Tiled,
-    /// The first so many rows.
+    /// Number of rows to compute, from the first.
     pub rows: usize,
     pub joint: &'a [f32],
     pub scratch: &'a mut Scratch,
-    /// At least `rows` numbers a channel.
+    /// Output: at least `rows` numbers in each channel.
     pub out: [&'a mut [f32]; CHANNELS],
 }
 
@@ -32,7 +32,7 @@ impl Kernel for Expand<'_> {
 }
 
 #[inline(always)]
-fn expand_rows<L: Lanes, E: Element>(l: L, values: &[E], job: &mut Expand<'_>) {
+fn expand_rows<L: Lanes, E: PackedNumber>(l: L, values: &[E], job: &mut Expand<'_>) {
     let basis = job.basis;
     let columns = basis.columns.get(0..basis.columns.len());
     let count = columns.indices().len();

@@ -4,27 +4,27 @@ use crate::modular::kernels::scratch::{Flux, Scratch, scale_joint};
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::PackedShape;
 use mrt_core::simd::folded::{Basis, unfold};
-use mrt_core::simd::tiles::{CHANNELS, Element, Rgb};
+use mrt_core::simd::tiles::{CHANNELS, PackedNumber, Rgb};
 use mrt_core::simd::{Kernel, Lanes};
 
-/// Irradiance of one block from its joint coefficients.
+/// Computes the irradiance of one block from its joint coefficients.
 pub(crate) struct IndirectOf<'a> {
     pub shape: &'a PackedShape,
     pub joint: &'a [f32],
     pub scratch: &'a mut Scratch,
-    /// Whether to find the largest change and irradiance; otherwise only whether there is light.
+    /// Whether to find the largest change and the largest irradiance; otherwise only whether there is light.
     pub compare: bool,
-    /// Irradiance; what was there before is replaced.
+    /// Output: irradiance. Its old content is only used for [`Arrived::change`].
     pub indirect: [&'a mut [f32]; CHANNELS],
 }
 
-/// What arrived at a block's walls.
+/// Light that arrived at the walls of a block.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrived {
     pub flux: Flux,
     /// Largest change of irradiance, W/m²; 0 if not compared.
     pub change: f32,
-    /// Largest irradiance, W/m²; if not compared, a number that is 0 where that is.
+    /// Largest irradiance, W/m²; if not compared, any number that is 0 exactly when the block is dark.
     pub peak: f32,
 }
 
@@ -51,7 +51,7 @@ impl Kernel for IndirectOf<'_> {
 }
 
 #[inline(always)]
-fn expand<L: Lanes, E: Element, const GROUP: usize>(
+fn expand<L: Lanes, E: PackedNumber, const GROUP: usize>(
     l: L,
     joint: &[E],
     block: &mut IndirectOf<'_>,

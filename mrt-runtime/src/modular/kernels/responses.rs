@@ -1,16 +1,16 @@
-//! `r = T_b->r b`, one block at a time, and how much it changes light.
+//! `r = T_b->r b`, one block at a time, and a bound of how much that changes light.
 
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::PackedShape;
 use crate::modular::packed::transport::{PackedTransport, TransportEntry};
 use crate::output::texel_layout::BlockRank;
 use mrt_core::simd::tiles::{
-    CHANNELS, Element, Finish, HALF_TILE, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
+    CHANNELS, Finish, HALF_TILE, PackedNumber, Rgb, TILE, Term, TileOut, sum_half_tile, sum_tile,
 };
 use mrt_core::simd::{Kernel, Lanes};
 use std::ops::Range;
 
-/// `r = T_b->r b` of one block, and its own coefficients.
+/// Computes the joint coefficients of one block: `r = T_b->r b`, plus its own coefficients b.
 pub(crate) struct ResponsesOf<'a> {
     /// Which block.
     pub block: BlockRank,
@@ -18,25 +18,26 @@ pub(crate) struct ResponsesOf<'a> {
     pub transport: &'a PackedTransport,
     /// Coefficients b of all blocks.
     pub coefficients: &'a [f32],
-    /// Whether a block has any.
+    /// By rank: whether the block has coefficients.
     pub has_coefficients: &'a [bool],
-    /// Whether all blocks have.
+    /// Whether all blocks have coefficients.
     pub all_lit: bool,
     pub gate_values: &'a [f32],
-    /// Joint coefficients of this block.
+    /// Output: joint coefficients of this block.
     pub joint: &'a mut [f32],
 }
 
-/// How much light may change where joint coefficients do.
+/// Bounds how much the light of a block changes with its joint coefficients.
 pub(crate) struct ChangeOf<'a> {
     pub shape: &'a PackedShape,
-    /// Channel by channel, as many as there are rows or more.
+    /// Old joint coefficients, channel by channel; at least as many in a channel as the shape has rows.
     pub before: &'a [f32],
     pub now: &'a [f32],
 }
 
 impl Kernel for ChangeOf<'_> {
-    /// No number of light, whatever the texel and channel, changes by more.
+    /// An upper bound of the change of irradiance at every texel, and of every coefficient of probes and of vector
+    /// irradiance.
     type Output = f32;
 
     #[inline(always)]
@@ -45,7 +46,7 @@ impl Kernel for ChangeOf<'_> {
         let stride = self.now.len() / CHANNELS;
         assert!(peaks.len().is_multiple_of(HALF_TILE) && peaks.len() <= stride);
         assert_eq!(self.before.len(), self.now.len(), "joint coefficients");
-        // Rows come in eights.
+        // Numbers of rows are multiples of eight.
         let l = l.narrow();
         let mut most = 0.0f32;
         for channel in 0..CHANNELS {
@@ -78,7 +79,7 @@ impl Kernel for ResponsesOf<'_> {
 }
 
 #[inline(always)]
-fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
+fn arrive<L: Lanes, E: PackedNumber>(l: L, values: &[E], block: &mut ResponsesOf<'_>) {
     let transport = block.transport;
     let stride = block.joint.len() / CHANNELS;
     let own = CHANNELS * stride * block.block.get();
@@ -86,7 +87,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
     let x = Rgb::new(block.coefficients, stride);
     let tiles = transport.tiles_of_block[block.block.get()].clone();
     let tiles = &transport.tiles[tiles.start as usize..tiles.end as usize];
-    // What the first tile's entries are, those of the others are or nearly so.
+    // The entries of all tiles of a block have nearly the same sources, so the first tile decides.
     let take_all = block.all_lit
         || tiles.first().is_some_and(|tile| {
             let entries = tile.entries.start + tile.gated..tile.entries.end;
@@ -101,7 +102,7 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
             let first = channel * stride + usize::from(row_tile.start);
             first..first + rows
         };
-        // The first joint modes are the block's own.
+        // The first joint modes take the block's own coefficients.
         let mut finish = Finish {
             scale: tile.scale,
             factors: &block.shape.row_inverses[row_tile.rows()],
@@ -158,19 +159,19 @@ fn arrive<L: Lanes, E: Element>(l: L, values: &[E], block: &mut ResponsesOf<'_>)
     }
 }
 
-/// Whether all columns of these entries are to be multiplied, though some may be dark: those are zero, and where they are
-/// few, leaving them out takes longer.
+/// Whether to multiply all columns of these entries, though some may belong to dark blocks. Coefficients of dark blocks
+/// are zero, and if they are few, leaving them out takes longer.
 #[inline(always)]
 fn has_few_dark<L: Lanes>(entries: &[TransportEntry], has_coefficients: &[bool]) -> bool {
-    // A column takes 3 cycles with 8 or 16 lanes, 12 with 4. Runs take some 50 more a tile, and end at ends that the
-    // machine guesses wrong; measured on x86-64 with a quarter of the blocks dark.
+    // A column takes 3 cycles with 8 or 16 lanes, 12 with 4. Runs of lit entries take some 50 cycles more for each
+    // tile, and their ends are mispredicted. Measured on x86-64 with a quarter of the blocks dark.
     let few = match L::N {
         1 => 0,
         4 => 8,
         _ => 32,
     };
     let mut dark = 0;
-    // Without branches: which blocks are lit is hard to guess.
+    // Without branches, since the machine cannot predict which blocks are lit.
     for entry in entries {
         let is_dark = !has_coefficients[entry.source.get()];
         dark += u32::from(is_dark) * (entry.columns.end - entry.columns.start);
@@ -178,15 +179,15 @@ fn has_few_dark<L: Lanes>(entries: &[TransportEntry], has_coefficients: &[bool])
     dark <= few
 }
 
-/// Runs of entries whose sources have light: their columns and numbers stand side by side, and one long product has no
-/// branch that the machine guesses wrong, where many short ones have two each.
+/// Runs of entries whose sources have light. The columns and numbers of a run are contiguous, and one long product has
+/// fewer mispredicted branches than many short ones, which have two each.
 struct LitRuns<'a> {
     entries: &'a [TransportEntry],
     has_coefficients: &'a [bool],
 }
 
 impl Iterator for LitRuns<'_> {
-    /// Columns, and the first number.
+    /// Columns of a run, and the index of its first number.
     type Item = (Range<usize>, usize);
 
     #[inline(always)]
@@ -201,7 +202,7 @@ impl Iterator for LitRuns<'_> {
     }
 }
 
-/// Columns of entries that stand side by side, and their first number.
+/// Columns of contiguous entries, and the index of their first number; `None` without entries.
 #[inline(always)]
 fn run_of(entries: &[TransportEntry]) -> Option<(Range<usize>, usize)> {
     let (first, last) = (entries.first()?, entries.last()?);
@@ -210,7 +211,7 @@ fn run_of(entries: &[TransportEntry]) -> Option<(Range<usize>, usize)> {
 }
 
 #[inline(always)]
-fn sum_terms<'a, L: Lanes, E: Element>(
+fn sum_terms<'a, L: Lanes, E: PackedNumber>(
     l: L,
     terms: impl Iterator<Item = Term<'a, E>>,
     finish: Finish<'_>,

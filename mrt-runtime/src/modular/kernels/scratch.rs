@@ -1,21 +1,21 @@
-//! What kernels write on the way.
+//! Memory for intermediate results of kernels.
 
 use mrt_core::simd::Aligned;
 use mrt_core::simd::tiles::CHANNELS;
 
-/// What kernels of one task write on the way.
+/// Memory for intermediate results of the kernels of one task.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// A block's radiosity by class, in that by channel.
+    /// Radiosity of a block: for each class, channel by channel.
     pub(super) folded: Aligned<f32>,
-    /// Coefficients times scales.
+    /// Joint coefficients multiplied by scales.
     pub(super) scaled: Aligned<f32>,
     /// Joint coefficients of a block.
     pub(crate) joint: Aligned<f32>,
 }
 
 impl Scratch {
-    /// For blocks of so many slots and coefficients.
+    /// For blocks of up to `slots` slots and `coefficients` coefficients in all channels.
     pub(crate) fn new(slots: usize, coefficients: usize) -> Self {
         Self {
             folded: Aligned::zeroed(CHANNELS * slots),
@@ -25,10 +25,10 @@ impl Scratch {
     }
 }
 
-/// Flux in units of a canonical texel's area, by channel.
+/// Flux in each channel, W/m² times the area of a canonical texel.
 pub(crate) type Flux = [f64; CHANNELS];
 
-/// Joint coefficients times the scales of a packed basis, by mode.
+/// Multiplies joint coefficients by the scales of a packed basis, row by row.
 #[inline(always)]
 pub(super) fn scale_joint(scales: &[f32], joint: &[f32], scaled: &mut [f32]) {
     let place = joint.len() / CHANNELS;

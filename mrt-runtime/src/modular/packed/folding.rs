@@ -1,4 +1,4 @@
-//! Slots: a shape's texels sorted by their images under its mirrors.
+//! Slots: the texels of a shape, sorted by their images under the shape's mirrors.
 
 use crate::level::mirrors::{mirrors, texel_permutation};
 use crate::level::shape::Shape;
@@ -7,48 +7,82 @@ use mrt_core::linalg::matrix::Matrix;
 use mrt_core::simd::{Aligned, WIDEST};
 use std::cmp::Reverse;
 
-/// An operator's numbers at mirrored texels may differ by this much of the largest of its mode and count as equal: far
-/// less than what `f32` sums lose.
+/// Numbers of a mode at mirrored texels count as equal if they differ by at most this share of the mode's largest
+/// number. Sums in `f32` lose far more.
 const SYMMETRY_TOLERANCE: f32 = 1e-6;
 
-/// Where each texel of a shape is kept: slot `element * stride + orbit`, for each element of the group that the mirrors
-/// make, and each orbit of texels under it.
+/// The slots of a shape's texels. Mirrors generate a group, and the group divides the texels into orbits: the slot of a
+/// texel is `element * stride + orbit`.
 ///
-/// Element bit k says that mirror k was applied. Modes are even or odd under each mirror, class bit k saying odd under
-/// mirror k, so sums over an orbit split into one a class, and a mode needs numbers for one texel of each orbit.
-/// A texel on a mirror's plane takes two slots, which always hold the same. Where orbits are so few that they mostly are
-/// padding, some of the mirrors are left out.
+/// Bit k of an element is set if mirror k was applied. Each mode is even or odd under each mirror; bit k of its class
+/// is set if it is odd under mirror k. So a sum over an orbit splits into one sum for each class, and a mode needs a
+/// number for only one texel of each orbit. A texel on the plane of a mirror has two slots with the same content. Some
+/// mirrors are left out where orbits would be so few that most of them are padding.
 #[derive(Clone, Debug)]
 pub struct Folding {
-    /// Number of mirrors, 0 to 3.
+    /// Number of mirrors in use, 0 to 3.
     pub mirrors: usize,
-    /// Which of them exchanges floor and ceiling, if one does.
+    /// The mirror that exchanges floor and ceiling; `None` if it is not in use.
     pub up_mirror: Option<usize>,
-    /// Orbits, rounded up to a multiple of [`WIDEST`].
+    /// Number of orbits, rounded up to a multiple of [`WIDEST`].
     pub stride: usize,
-    /// By texel in the shape's order.
+    /// By texel, in the order of the shape: its first slot.
     pub slot_of_texel: Vec<u32>,
-    /// By slot; `u32::MAX` where there is no texel.
+    /// By slot: its texel; `u32::MAX` for a slot without a texel.
     pub texel_of_slot: Vec<u32>,
-    /// By orbit: texels over elements of the group. Sums over slots count texels of mirrors' planes twice.
+    /// By orbit: number of its texels divided by the number of its slots, since sums over slots count a texel on the
+    /// plane of a mirror twice.
     pub multiplicity: Aligned<f32>,
-    /// By orbit: multiplicity times the area of its texels, over that of a cube's texel.
+    /// By orbit: multiplicity times the area of its texels, in areas of a cube's texel.
     pub weight: Aligned<f32>,
 }
 
-/// Multiply-adds that take as long as all else that is done with a slot: sums and differences both ways, loads and
-/// stores. Measured on x86-64, where 6 and 10 choose alike but for straight blocks at 6²: these are slower at 6.
+/// Time of all work on a slot besides products (sums and differences in both directions, loads and stores), in
+/// multiply-adds. Measured on x86-64: with 6 instead of 10, only the choice for straight blocks at 6² texels differs,
+/// and is slower.
 const SLOT_COST: usize = 10;
 
-/// A mirror that a shape and its operators have.
+/// A mirror under which a shape is symmetric, and its operators are even or odd.
 struct Mirror {
     /// Whether it exchanges floor and ceiling.
     is_up: bool,
     /// By texel: its image.
     permutation: Vec<u32>,
-    /// Whether modes are odd.
+    /// By mode of `T_d->b`: whether it is odd.
     coefficients: Vec<bool>,
+    /// By joint mode: whether it is odd.
     joint: Vec<bool>,
+}
+
+impl Mirror {
+    /// `None` if the texels' areas or a mode of the operators do not have the mirror.
+    fn of_operators(
+        is_up: bool,
+        permutation: Vec<u32>,
+        (coefficients, joint): (&Matrix<f32>, &Matrix<f32>),
+        areas: &[f32],
+    ) -> Option<Self> {
+        let area = |k: usize| areas.get(k).copied().unwrap_or(1.0);
+        let has_same_areas = (0..joint.rows()).all(|k| {
+            let other = area(permutation[k] as usize);
+            (area(k) - other).abs() <= SYMMETRY_TOLERANCE * other
+        });
+        if !has_same_areas {
+            return None;
+        }
+        let coefficients = (0..coefficients.rows())
+            .map(|mode| parity(&permutation, |texel| coefficients[(mode, texel)]))
+            .collect::<Option<_>>()?;
+        let joint = (0..joint.columns())
+            .map(|mode| parity(&permutation, |texel| joint[(texel, mode)]))
+            .collect::<Option<_>>()?;
+        Some(Self {
+            is_up,
+            permutation,
+            coefficients,
+            joint,
+        })
+    }
 }
 
 /// The class of each mode of a shape's operators.
@@ -59,7 +93,8 @@ pub(crate) struct Classes {
 }
 
 impl Folding {
-    /// By the mirrors that the shape and these operators have: modes x texels, and texels x joint modes.
+    /// Folds by the mirrors of a shape and its operators: `coefficients` is modes x texels, `joint` is texels x joint
+    /// modes.
     pub(crate) fn new(
         shape: &Shape,
         resolution: usize,
@@ -72,41 +107,24 @@ impl Folding {
             coefficients: vec![0; coefficients.rows()],
             joint: vec![0; joint.columns()],
         };
-        let mut found: Vec<Mirror> = Vec::new();
         let candidates = if shape.tube().is_some() {
             Vec::new()
         } else {
             mirrors(shape)
         };
-        for map in candidates {
+        let mirror = |map| {
             let permutation = texel_permutation(shape, resolution, map);
-            let area = |k: usize| areas.get(k).copied().unwrap_or(1.0);
-            let same_areas = (0..texels).all(|k| {
-                let other = area(permutation[k] as usize);
-                (area(k) - other).abs() <= SYMMETRY_TOLERANCE * other
-            });
-            let coefficients: Option<Vec<bool>> = (0..coefficients.rows())
-                .map(|mode| parity(&permutation, |texel| coefficients[(mode, texel)]))
-                .collect();
-            let joint: Option<Vec<bool>> = (0..joint.columns())
-                .map(|mode| parity(&permutation, |texel| joint[(texel, mode)]))
-                .collect();
-            if let (true, Some(coefficients), Some(joint)) = (same_areas, coefficients, joint) {
-                found.push(Mirror {
-                    is_up: map == CubeSymmetry::mirror(1),
-                    permutation,
-                    coefficients,
-                    joint,
-                });
-            }
-        }
+            let is_up = map == CubeSymmetry::mirror(1);
+            Mirror::of_operators(is_up, permutation, (coefficients, joint), areas)
+        };
+        let found: Vec<Mirror> = candidates.into_iter().filter_map(mirror).collect();
         let folded = |subset: usize| {
             let bits = (0..found.len()).filter(move |k| subset >> k & 1 == 1);
             let permutations = bits.clone().map(|k| &found[k].permutation[..]).collect();
             (Self::by_mirrors(texels, permutations, areas), bits)
         };
         let modes = coefficients.rows() + joint.columns();
-        // Tiles need the mirror between floor and ceiling.
+        // Tiles of rows need the mirror that exchanges floor and ceiling.
         let (folding, bits) = (0..1usize << found.len())
             .filter(|subset| (0..found.len()).all(|k| !found[k].is_up || subset >> k & 1 == 1))
             .map(folded)
@@ -129,11 +147,12 @@ impl Folding {
         (folding, classes)
     }
 
-    /// What a block costs: multiply-adds of so many modes, and work on slots, in units of a number a channel.
+    /// Time of one block with `modes` modes, in multiply-adds of one channel: products, and other work on slots.
     fn cost(&self, modes: usize) -> usize {
         self.stride * modes + self.slots() * SLOT_COST
     }
 
+    /// The slots under mirrors with these permutations of texels.
     fn by_mirrors(texels: usize, permutations: Vec<&[u32]>, areas: &[f32]) -> Self {
         let elements = 1usize << permutations.len();
         let image = |element: usize, texel: usize| {
@@ -178,17 +197,17 @@ impl Folding {
         folding
     }
 
-    /// Elements of the group, and number of classes.
+    /// Number of elements of the group, which is also the number of classes.
     pub fn elements(&self) -> usize {
         1 << self.mirrors
     }
 
-    /// Slots of a block.
+    /// Number of slots of a block.
     pub fn slots(&self) -> usize {
         self.elements() * self.stride
     }
 
-    /// The texel that an orbit's numbers are those of, if there is such an orbit.
+    /// The texel whose numbers operators store for an orbit; `None` for padding.
     pub(crate) fn first(&self, orbit: usize) -> Option<usize> {
         match self.texel_of_slot[orbit] {
             u32::MAX => None,
@@ -197,7 +216,7 @@ impl Folding {
     }
 }
 
-/// Whether a signal is odd under a mirror; `None` if it is neither odd nor even.
+/// True for a signal that is odd under a mirror, false for an even one; `None` if it is neither.
 fn parity(permutation: &[u32], signal: impl Fn(usize) -> f32) -> Option<bool> {
     let texels = || 0..permutation.len();
     let largest = texels().fold(0.0f32, |m, k| m.max(signal(k).abs()));

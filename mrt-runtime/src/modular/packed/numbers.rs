@@ -1,22 +1,22 @@
-//! Numbers as `f32`, `f16` or `int8`, in whole cache lines.
+//! Packed numbers of operators: `f32`, `f16` or `int8`, aligned to cache lines.
 
 use half::f16;
 use mrt_core::simd::Aligned;
 use mrt_core::storage::Storage;
 
-/// Packed numbers.
+/// Numbers in one of three formats.
 #[derive(Clone, Debug)]
 pub enum PackedNumbers {
-    /// As they are.
+    /// Single precision.
     F32(Aligned<f32>),
-    /// Bits of half-precision numbers, to be multiplied by a scale.
+    /// Bits of half-precision numbers; a scale multiplies them.
     F16(Aligned<u16>),
-    /// Integers, to be multiplied by a scale.
+    /// Integers; a scale multiplies them.
     Int8(Aligned<i8>),
 }
 
 impl PackedNumbers {
-    /// None yet.
+    /// No numbers yet.
     pub(crate) fn new(storage: Storage) -> Self {
         match storage {
             Storage::F32 => PackedNumbers::F32(Aligned::new()),
@@ -25,7 +25,7 @@ impl PackedNumbers {
         }
     }
 
-    /// How many.
+    /// Number of numbers.
     pub fn len(&self) -> usize {
         match self {
             PackedNumbers::F32(v) => v.len(),
@@ -34,12 +34,12 @@ impl PackedNumbers {
         }
     }
 
-    /// True if there are none.
+    /// True if there are no numbers.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Their bytes.
+    /// Bytes of all numbers.
     pub fn bytes(&self) -> usize {
         match self {
             PackedNumbers::F32(v) => size_of_val(&**v),
@@ -48,7 +48,7 @@ impl PackedNumbers {
         }
     }
 
-    /// Appends numbers that are to be multiplied by `scale`, which is a power of two.
+    /// Appends a number. Readers multiply it by `scale`, which comes from [`PackedNumbers::scale`].
     pub(crate) fn push(&mut self, value: f32, scale: f32) {
         match self {
             PackedNumbers::F32(v) => v.push(value),
@@ -57,7 +57,7 @@ impl PackedNumbers {
         }
     }
 
-    /// Appends zeros until the next number begins a cache line.
+    /// Appends zeros until the next number is at the start of a cache line.
     pub(crate) fn fill_line(&mut self) {
         match self {
             PackedNumbers::F32(v) => v.fill_line(),
@@ -66,10 +66,10 @@ impl PackedNumbers {
         }
     }
 
-    /// The scale that numbers of up to this magnitude need: 1 for `f32`, a power of two for `f16` that keeps them well
-    /// above its subnormal numbers, a 127th for `int8`.
+    /// The scale for numbers of magnitude up to `largest`: 1 for `f32`; for `f16`, a power of two that keeps them well
+    /// above subnormal numbers; `largest` / 127 for `int8`.
     pub(crate) fn scale(storage: Storage, largest: f32) -> f32 {
-        // Below this nothing is left of a light that frames accept.
+        // Even the brightest light that frames accept is nothing when multiplied by such a number.
         if largest < 1e-30 {
             return 1.0;
         }

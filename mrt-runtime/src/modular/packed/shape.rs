@@ -1,4 +1,4 @@
-//! The operators of one shape, folded and packed.
+//! Folded and packed operators of one shape.
 
 use crate::level::shape::Shape;
 use crate::modular::packed::folding::{Classes, Folding};
@@ -11,82 +11,83 @@ use mrt_core::simd::tiles::{ColumnLists, HALF_TILE, TILE};
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
-/// Operators of a shape as frames read them.
+/// The operators of a shape as frames read them.
 #[derive(Clone, Debug)]
 pub struct PackedShape {
-    /// Where texels are kept.
+    /// The slots of texels.
     pub folding: Folding,
     /// Number of modes `k_b`.
     pub modes: usize,
     /// Number of joint modes.
     pub joint_modes: usize,
-    /// Rows that there are coefficients for, a channel: joint modes and padding. Coefficients b take those of the joint
-    /// modes that are theirs, and all others are zero.
+    /// Number of rows of coefficients in each channel: joint modes and padding. A coefficient b is in the row of its
+    /// joint mode; the other rows of coefficients b are zero.
     ///
-    /// Modes of one class stand together: light that goes from block to block keeps its parity under the mirrors that the
-    /// blocks share, and then half of a tile's columns or more are zero.
+    /// Modes of one class have neighbouring rows. Light that goes from block to block keeps its parity under the
+    /// mirrors that the blocks share, so half of the columns of a tile, or more, are zero and left out.
     pub rows: usize,
-    /// By joint mode: its row. The first joint modes are those of coefficients b.
+    /// By joint mode: its row. The first joint modes belong to coefficients b.
     pub(crate) row_of_mode: Vec<u16>,
-    /// `u16::MAX` for padding.
+    /// By row: its joint mode; `u16::MAX` for padding.
     mode_of_row: Vec<u16>,
-    /// `T_d->b`, in groups of rows of one class; each row has one number an orbit.
+    /// `T_d->b` in groups of rows; each row has one number for each orbit.
     pub(crate) from_direct: PackedNumbers,
     pub(crate) groups: Vec<Group>,
-    /// The joint basis: tile after tile of orbits, in a tile one column a mode, class after class.
+    /// The joint basis: tile after tile of orbits, in a tile one column for each mode, class after class.
     pub(crate) joint: PackedNumbers,
     /// By class: the rows of its joint modes.
     pub(crate) joint_classes: Vec<Range<usize>>,
-    /// What coefficients are multiplied by, by row; empty if by 1.
+    /// By row: the scale that multiplies joint coefficients before the joint basis; empty if all are 1.
     pub(crate) joint_scales: Vec<f32>,
-    /// All rows.
+    /// Tiles that cover all rows.
     pub(crate) row_tiles: Vec<RowTile>,
-    /// By joint mode: a power of two near the size of its light. Responses are stored in such units, so that strong modes
-    /// do not take all the digits.
+    /// By joint mode: a power of two near the norm of its light. Transport is stored in these units, so that strong
+    /// modes do not use up the digits of weak ones.
     pub(crate) units: Vec<f32>,
-    /// By row: one over the unit of its mode.
+    /// By row: 1 / the unit of its mode; 0 for padding.
     pub(crate) row_inverses: Aligned<f32>,
-    /// By row: the largest number of its mode, at texels and among the coefficients of probes and of vector irradiance.
+    /// By row: the largest magnitude in its mode, over texels and the coefficients of probes and of vector irradiance.
     pub(crate) peaks: Aligned<f32>,
-    /// Area of the walls, in units of a canonical texel's.
+    /// Area of the walls, in areas of a canonical texel.
     pub(crate) area: f32,
-    /// Size of the light of each joint mode, and of the light that makes each coefficient.
+    /// By joint mode: norm of its light.
     pub(crate) joint_norms: Vec<f32>,
+    /// By coefficient b: norm of its row of `T_d->b`.
     pub(crate) coefficient_norms: Vec<f32>,
-    /// SH coefficients of probes, coefficient by coefficient and in that probe by probe.
+    /// SH coefficients of probes: for each coefficient, probe by probe.
     pub(crate) probes: Tiled,
-    /// Vector irradiance, texel by texel and in that coefficient by coefficient.
+    /// Vector irradiance: for each texel, coefficient by coefficient.
     pub(crate) vector: Tiled,
 }
 
 /// Rows that are computed together.
 #[derive(Clone, Copy, Debug)]
 pub struct RowTile {
-    /// The first.
+    /// The first row.
     pub start: u16,
-    /// How many: [`TILE`], or [`HALF_TILE`].
+    /// Number of rows: [`TILE`] or [`HALF_TILE`].
     pub height: u8,
 }
 
-/// Up to [`DOT_ROWS`] modes of one class, or that many of several.
+/// Up to [`DOT_ROWS`] modes of one class, or exactly [`DOT_ROWS`] modes of several classes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Group {
-    /// How many.
+    /// Number of modes.
     pub count: u8,
-    /// Whether they are of several classes; else they have consecutive rows.
+    /// Whether the modes are not consecutive rows of one class.
     pub is_mixed: bool,
-    /// The class of each.
+    /// Class of each mode.
     pub classes: [u8; DOT_ROWS],
-    /// The row of each.
+    /// Row of each mode.
     pub rows: [u16; DOT_ROWS],
-    /// The scale of each.
+    /// Scale of each mode.
     pub scales: [f32; DOT_ROWS],
 }
 
-/// A matrix in tiles, all of whose columns are used.
+/// A matrix in tiles that use all columns.
 #[derive(Clone, Debug)]
 pub struct Tiled {
-    /// Rows before padding.
+    /// Number of rows without padding.
     pub rows: usize,
     pub(crate) values: PackedNumbers,
     pub(crate) columns: ColumnLists,
@@ -94,7 +95,7 @@ pub struct Tiled {
 }
 
 impl Tiled {
-    /// Packs a matrix with a column for each joint mode, of whose rows `row(k)` is number k.
+    /// Packs a matrix with one column for each joint mode. Packed row k is row `row(k)` of the matrix.
     fn new(
         matrix: &Matrix<f32>,
         row: impl Fn(usize) -> usize,
@@ -137,8 +138,43 @@ pub struct Operators<'a> {
     pub probe_basis: &'a Matrix<f32>,
     /// 4 texels x joint modes, or no rows.
     pub vector_basis: &'a Matrix<f32>,
-    /// By texel; empty if all are 1.
+    /// By texel: area in areas of a canonical texel; empty if all are 1.
     pub areas: &'a [f32],
+}
+
+impl Operators<'_> {
+    /// The largest number of a joint mode in all bases; 0 if there is no such mode.
+    fn peak(&self, mode: usize) -> f32 {
+        [self.joint_basis, self.probe_basis, self.vector_basis]
+            .into_iter()
+            .filter(|basis| mode < basis.columns())
+            .flat_map(|basis| basis.column(mode))
+            .fold(0.0f32, |m, x| m.max(x.abs()))
+    }
+}
+
+/// The joint basis: tile after tile of orbits, in a tile one column for each mode, class after class.
+fn joint_tiles(
+    folding: &Folding,
+    order: &RowOrder,
+    basis: &Matrix<f32>,
+    scales: &[f32],
+    storage: Storage,
+) -> PackedNumbers {
+    let mut numbers = PackedNumbers::new(storage);
+    for tile in (0..folding.stride).step_by(TILE) {
+        for rows in &order.classes {
+            for &mode in &order.mode_of_row[rows.clone()] {
+                let mode = usize::from(mode);
+                for orbit in tile..tile + TILE {
+                    let texel = folding.first(orbit);
+                    let value = texel.map_or(0.0, |texel| basis[(texel, mode)]);
+                    numbers.push(value, scales[mode]);
+                }
+            }
+        }
+    }
+    numbers
 }
 
 impl PackedShape {
@@ -152,18 +188,7 @@ impl PackedShape {
         let (folding, classes) = Folding::new(shape, resolution, t, j, operators.areas);
         let order = RowOrder::new(&folding, &classes.joint);
         let scales = scales(j, storage);
-        let mut joint = PackedNumbers::new(storage);
-        for tile in (0..folding.stride).step_by(TILE) {
-            for rows in &order.classes {
-                for &mode in &order.mode_of_row[rows.clone()] {
-                    let mode = usize::from(mode);
-                    for orbit in tile..tile + TILE {
-                        let value = folding.first(orbit).map_or(0.0, |texel| j[(texel, mode)]);
-                        joint.push(value, scales[mode]);
-                    }
-                }
-            }
-        }
+        let joint = joint_tiles(&folding, &order, j, &scales, storage);
         let norm =
             |values: &mut dyn Iterator<Item = f32>| values.map(|x| x * x).sum::<f32>().sqrt();
         let joint_norms: Vec<f32> = (0..j.columns())
@@ -172,14 +197,7 @@ impl PackedShape {
         let units: Vec<f32> = joint_norms.iter().map(|&n| power_of_two(n)).collect();
         let inverse = |&mode: &u16| units.get(usize::from(mode)).map_or(0.0, |unit| 1.0 / unit);
         let row_inverses = order.mode_of_row.iter().map(inverse).collect();
-        let peak = |&mode: &u16| {
-            let mode = usize::from(mode);
-            [j, operators.probe_basis, operators.vector_basis]
-                .into_iter()
-                .filter(|basis| mode < basis.columns())
-                .flat_map(|basis| basis.column(mode))
-                .fold(0.0f32, |m, x| m.max(x.abs()))
-        };
+        let peak = |&mode: &u16| operators.peak(usize::from(mode));
         let peaks = order.mode_of_row.iter().map(peak).collect();
         let area = folding.weight.iter().sum::<f32>() * folding.elements() as f32;
         let coefficient_norms = (0..t.rows())
@@ -216,7 +234,7 @@ impl PackedShape {
         }
     }
 
-    /// The joint mode of each of these rows; `None` for padding.
+    /// The joint modes of a range of rows; `None` for padding.
     pub(crate) fn modes_of(
         &self,
         rows: Range<usize>,
@@ -230,7 +248,7 @@ impl PackedShape {
         self.stage_bytes().iter().sum::<usize>() + self.probes.bytes() + self.vector.bytes()
     }
 
-    /// Bytes of `T_d->b` and of the joint basis.
+    /// Bytes of `T_d->b`, and of the joint basis.
     pub fn stage_bytes(&self) -> [usize; 2] {
         [
             self.from_direct.bytes() + size_of_val(self.groups.as_slice()),
@@ -238,7 +256,7 @@ impl PackedShape {
         ]
     }
 
-    /// Multiply-adds of `T_d->b` and of the joint basis for one block, three channels, without padding.
+    /// Multiply-adds of `T_d->b`, and of the joint basis, for one block and three channels, without padding.
     pub fn multiply_adds(&self) -> [usize; 2] {
         let orbits = self.folding.multiplicity.iter().filter(|&&m| m > 0.0);
         let orbits = orbits.count();
@@ -246,12 +264,12 @@ impl PackedShape {
     }
 }
 
-/// Which row each joint mode has.
+/// The order of rows: classes of joint modes, in tiles.
 struct RowOrder {
     row_of_mode: Vec<u16>,
-    /// `u16::MAX` where rows are padding.
+    /// `u16::MAX` for padding.
     mode_of_row: Vec<u16>,
-    /// By class.
+    /// By class: its rows.
     classes: Vec<Range<usize>>,
     tiles: Vec<RowTile>,
 }
@@ -264,8 +282,8 @@ impl RowOrder {
             classes: vec![0..0; folding.elements()],
             tiles: Vec::new(),
         };
-        // Levels are flat more often than not: blocks on one floor share the mirror between floor and ceiling, so tiles
-        // are of modes that are even or odd under it.
+        // Most levels are flat, and blocks on one floor share the mirror that exchanges floor and ceiling. So a tile
+        // has only modes that are even under that mirror, or only odd ones.
         let is_odd = |class: usize| folding.up_mirror.is_some_and(|k| class >> k & 1 == 1);
         for odd in [false, true] {
             for class in (0..folding.elements()).filter(|&class| is_odd(class) == odd) {
@@ -292,7 +310,7 @@ impl RowOrder {
         order
     }
 
-    /// Scales of modes by row, 1 where rows are padding; none for numbers that need none.
+    /// Scales by row, 1 for padding; empty for `f32`, which has no scales.
     fn scales_by_row(&self, scales: &[f32], storage: Storage) -> Vec<f32> {
         if storage == Storage::F32 {
             return Vec::new();
@@ -303,7 +321,7 @@ impl RowOrder {
 }
 
 impl RowTile {
-    /// Its rows.
+    /// The rows of the tile.
     pub(crate) fn rows(&self) -> Range<usize> {
         usize::from(self.start)..self.end()
     }
@@ -313,7 +331,7 @@ impl RowTile {
     }
 }
 
-/// Scale of each column.
+/// Scale of each column of a matrix.
 fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
     (0..matrix.columns())
         .map(|j| {
@@ -323,7 +341,7 @@ fn scales(matrix: &Matrix<f32>, storage: Storage) -> Vec<f32> {
         .collect()
 }
 
-/// The largest power of two that is not above a number; 1 for what is no light.
+/// The largest power of two that is not above a number; 1 for numbers so small that no light is left of them.
 fn power_of_two(x: f32) -> f32 {
     if x < 1e-30 {
         return 1.0;
@@ -334,6 +352,7 @@ fn power_of_two(x: f32) -> f32 {
 /// SH coefficients of a probe.
 const SH_COEFFICIENTS: usize = PROBE_COEFFICIENTS;
 
+/// Packs `T_d->b`, and the list of its groups.
 fn coefficient_rows(
     folding: &Folding,
     classes: &Classes,
@@ -341,46 +360,19 @@ fn coefficient_rows(
     t: &Matrix<f32>,
     storage: Storage,
 ) -> (PackedNumbers, Vec<Group>) {
-    let rows = (0u16..).zip(&order.mode_of_row);
-    let own: Vec<(u16, usize)> = rows
-        .map(|(row, &mode)| (row, usize::from(mode)))
-        .filter(|&(_, mode)| mode < t.rows())
-        .collect();
-    let class = |mode: usize| classes.coefficients[mode];
-    let neighbours =
-        |a: &(u16, usize), b: &(u16, usize)| b.0 == a.0 + 1 && class(a.1) == class(b.1);
-    // Few rows of a class do better in company, though each then needs light of its own.
-    let mut lonely: Vec<(u16, usize)> = Vec::new();
-    let mut members: Vec<Vec<(u16, usize)>> = Vec::new();
-    for run in own.chunk_by(neighbours) {
-        let (full, rest) = run.split_at(run.len() / DOT_ROWS * DOT_ROWS);
-        members.extend(full.chunks(DOT_ROWS).map(<[_]>::to_vec));
-        if rest.len() > FEW_ROWS {
-            members.push(rest.to_vec());
-        } else {
-            lonely.extend(rest);
-        }
-    }
-    members.extend(lonely.chunks(DOT_ROWS).map(<[_]>::to_vec));
-    // Those of one class write some rows more than they have, so in ascending order, and before the mixed ones.
-    let are_mixed = |members: &[(u16, usize)]| {
-        let alike = |pair: &[(u16, usize)]| neighbours(&pair[0], &pair[1]);
-        !members.windows(2).all(alike)
-    };
-    members.sort_by_key(|members| (are_mixed(members), members[0].0));
     let mut numbers = PackedNumbers::new(storage);
     let mut groups = Vec::new();
-    for members in members {
+    for members in grouped_rows(order, classes, t.rows()) {
         let is_mixed = are_mixed(&members);
         let mut group = Group {
             is_mixed,
             ..Group::default()
         };
-        // Mixed groups are always full: the last row again.
+        // Kernels take mixed groups as full: the last row fills them up.
         let count = if is_mixed { DOT_ROWS } else { members.len() };
         group.count = count as u8;
         for k in 0..count {
-            let (row, mode) = members[k.min(members.len() - 1)];
+            let GroupRow { row, mode, class } = members[k.min(members.len() - 1)];
             let value = |orbit: usize| {
                 let texel = folding.first(orbit)?;
                 Some(t[(mode, texel)] * folding.multiplicity[orbit])
@@ -394,12 +386,62 @@ fn coefficient_rows(
             for orbit in orbits {
                 numbers.push(value(orbit).unwrap_or(0.0), scale);
             }
-            (group.rows[k], group.classes[k], group.scales[k]) = (row, class(mode), scale);
+            (group.rows[k], group.classes[k], group.scales[k]) = (row, class, scale);
         }
         groups.push(group);
     }
     (numbers, groups)
 }
 
-/// Rows of one class that are too few for a group.
+/// A row that a coefficient b has.
+#[derive(Clone, Copy)]
+struct GroupRow {
+    row: u16,
+    mode: usize,
+    class: u8,
+}
+
+impl GroupRow {
+    /// True if `next` is the next row, and of the same class.
+    fn is_followed_by(&self, next: &GroupRow) -> bool {
+        next.row == self.row + 1 && next.class == self.class
+    }
+}
+
+/// Whether rows are not consecutive rows of one class.
+fn are_mixed(rows: &[GroupRow]) -> bool {
+    !rows.windows(2).all(|pair| pair[0].is_followed_by(&pair[1]))
+}
+
+/// The rows of coefficients b in groups of up to [`DOT_ROWS`]. Groups of one class come first, in ascending order:
+/// kernels write zeros to the rows after a group that is not full, and those rows get their values from later groups.
+fn grouped_rows(order: &RowOrder, classes: &Classes, modes: usize) -> Vec<Vec<GroupRow>> {
+    let rows = (0u16..).zip(&order.mode_of_row);
+    let own: Vec<GroupRow> = rows
+        .map(|(row, &mode)| (row, usize::from(mode)))
+        .filter(|&(_, mode)| mode < modes)
+        .map(|(row, mode)| GroupRow {
+            row,
+            mode,
+            class: classes.coefficients[mode],
+        })
+        .collect();
+    // A mixed group needs folded light of several classes, but fewer rows of padding than several groups of few rows.
+    let mut few: Vec<GroupRow> = Vec::new();
+    let mut groups: Vec<Vec<GroupRow>> = Vec::new();
+    for run in own.chunk_by(GroupRow::is_followed_by) {
+        let (full, rest) = run.split_at(run.len() / DOT_ROWS * DOT_ROWS);
+        groups.extend(full.chunks(DOT_ROWS).map(<[_]>::to_vec));
+        if rest.len() > FEW_ROWS {
+            groups.push(rest.to_vec());
+        } else {
+            few.extend(rest);
+        }
+    }
+    groups.extend(few.chunks(DOT_ROWS).map(<[_]>::to_vec));
+    groups.sort_by_key(|rows| (are_mixed(rows), rows[0].row));
+    groups
+}
+
+/// Up to this many rows of one class are too few for a group of their own.
 const FEW_ROWS: usize = 2;

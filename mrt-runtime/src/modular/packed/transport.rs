@@ -1,4 +1,4 @@
-//! `T_b->r` by where light arrives, without what is zero or negligible.
+//! `T_b->r`, sorted by the block where light arrives, without columns that are zero or negligible.
 
 use crate::modular::packed::numbers::PackedNumbers;
 use crate::modular::packed::shape::PackedShape;
@@ -8,60 +8,59 @@ use mrt_core::simd::tiles::ColumnLists;
 use mrt_core::storage::Storage;
 use std::ops::Range;
 
-/// From the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are counted as frames keep them
-/// ([`TexelLayout`]).
+/// The operator from the coefficients b of all blocks to the joint coefficients of all blocks. Blocks are in the order
+/// of [`TexelLayout`].
 #[derive(Clone, Debug, Default)]
 pub struct PackedTransport {
-    /// By block: its tiles.
+    /// By rank: the tiles of the block.
     pub(crate) tiles_of_block: Vec<Range<u32>>,
     pub(crate) tiles: Vec<TransportTile>,
     pub(crate) entries: Vec<TransportEntry>,
-    /// Where coefficients stand among those of all blocks.
+    /// Columns of entries: positions of coefficients among those of all blocks.
     pub(crate) columns: ColumnLists,
-    /// One a column, for `int8` only.
+    /// Scale of each column, for `int8` only.
     pub(crate) column_scales: Vec<f32>,
     pub(crate) values: Option<PackedNumbers>,
-    /// By gate: the doors whose values multiply what passes it.
+    /// By gate: the doors whose values multiply light that passes it.
     pub(crate) gates: Vec<Vec<u32>>,
-    /// Blocks that a block sends light to, itself not counted unless it does: those of block k are
-    /// `reached[reached_by[k]..reached_by[k + 1]]`.
+    /// The block of rank k sends light to the blocks `reached[reached_by[k]..reached_by[k + 1]]`.
     pub(crate) reached_by: Vec<u32>,
     pub(crate) reached: Vec<BlockRank>,
     dense_multiply_adds: usize,
     multiply_adds: usize,
 }
 
-/// What arrives in one [`RowTile`](crate::modular::packed::shape::RowTile) of a block.
+/// Light that arrives in one [`RowTile`](crate::modular::packed::shape::RowTile) of a block.
 #[derive(Clone, Debug)]
 pub struct TransportTile {
     pub(crate) entries: Range<u32>,
-    /// How many of them pass gates; those come first.
+    /// Number of entries that pass a gate; they come first.
     pub(crate) gated: u32,
-    /// What sums are multiplied by.
+    /// Scale that multiplies sums.
     pub(crate) scale: f32,
-    /// Rows.
+    /// Number of rows.
     height: u8,
 }
 
-/// What one block sends to a tile.
+/// Light that one block sends to a tile.
 #[derive(Clone, Debug)]
 pub struct TransportEntry {
     pub(crate) source: BlockRank,
-    /// Which of the gates it passes; `u32::MAX` if none.
+    /// The gate that it passes; [`NO_GATE`] if none.
     pub(crate) gate: u32,
-    /// In the lists of columns.
+    /// Range in [`PackedTransport::columns`].
     pub(crate) columns: Range<u32>,
-    /// First number.
+    /// Index of its first number in [`PackedTransport::values`].
     pub(crate) start: u32,
 }
 
-/// Makes a [`PackedTransport`], one pair of blocks after another.
+/// Builds a [`PackedTransport`] from operators of pairs of blocks.
 #[derive(Debug)]
 pub struct TransportPacker<'a> {
     shapes: &'a [PackedShape],
-    /// By block, as frames count them: its shape.
+    /// By rank: the shape of the block.
     shape_of_block: Vec<usize>,
-    /// From a block's coefficients to the next one's.
+    /// Distance between the coefficients of a block and those of the next.
     block_stride: u32,
     storage: Storage,
     negligible: Option<f32>,
@@ -104,15 +103,16 @@ impl<'a> TransportPacker<'a> {
         }
     }
 
-    /// Bytes of what was added.
+    /// Bytes of all operators added so far.
     pub(crate) fn bytes(&self) -> usize {
         size_of_val(self.values.as_slice()) + size_of_val(self.columns.as_slice())
     }
 
-    /// Adds what `source` sends to `target` through these doors, joint modes x modes. No pair twice with the same doors.
+    /// Adds the operator, joint modes x modes, of light from `source` to `target` that passes `doors`. Call it at most
+    /// once for each pair and set of doors.
     ///
-    /// Columns of tiles are left out from the least on, up to a share `negligible` of the pair's light in L2, measured by
-    /// the light on the receiving walls of unit light on the sending ones.
+    /// The weakest columns of tiles are left out, up to a share `negligible` of the pair's light in L2. A column's
+    /// light is the light on the receiving walls from unit light on the sending walls.
     pub(crate) fn add(
         &mut self,
         doors: &[u32],
@@ -120,52 +120,17 @@ impl<'a> TransportPacker<'a> {
         source: BlockRank,
         operator: &Matrix<f32>,
     ) {
+        let shapes = self.shapes;
         let (to, from) = (
-            &self.shapes[self.shape_of_block[target.get()]],
-            &self.shapes[self.shape_of_block[source.get()]],
+            &shapes[self.shape_of_block[target.get()]],
+            &shapes[self.shape_of_block[source.get()]],
         );
         self.dense_multiply_adds += 3 * operator.rows() * operator.columns();
-        let gate = if doors.is_empty() {
-            u32::MAX
-        } else {
-            let known = self.gates.iter().position(|gate| gate == doors);
-            known.unwrap_or_else(|| {
-                self.gates.push(doors.to_vec());
-                self.gates.len() - 1
-            }) as u32
-        };
-        let columns = operator.columns();
-        // (energy, tile, column) of everything.
-        let mut parts: Vec<(f64, u32, u16)> = Vec::new();
-        for (tile, rows) in to.row_tiles.iter().enumerate() {
-            let modes = to.modes_of(rows.rows());
-            for column in 0..columns {
-                let size = |mode: usize| {
-                    f64::from(to.joint_norms[mode]) * f64::from(operator[(mode, column)])
-                };
-                let sizes = modes.clone().flatten().map(size);
-                let energy: f64 = sizes.map(|size| size * size).sum();
-                let light = f64::from(from.coefficient_norms[column]);
-                parts.push((energy * light * light, tile as u32, column as u16));
-            }
-        }
-        let total: f64 = parts.iter().map(|p| p.0).sum();
-        if total == 0.0 {
-            return;
-        }
-        parts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
-        let share = self.negligible.unwrap_or_else(|| negligible(columns));
-        let share = f64::from(share).max(ROUNDING);
-        let mut left_out = 0.0;
-        let kept = parts
-            .iter()
-            .position(|part| {
-                left_out += part.0;
-                left_out > share * share * total
-            })
-            .unwrap_or(0);
-        let mut kept: Vec<(u32, u16)> = parts[kept..].iter().map(|p| (p.1, p.2)).collect();
-        kept.sort_unstable();
+        let gate = self.gate(doors);
+        let parts = tile_columns(to, from, operator);
+        let share = self.negligible;
+        let share = share.unwrap_or_else(|| negligible(operator.columns()));
+        let kept = strongest(parts, f64::from(share).max(ROUNDING));
         for part in kept.chunk_by(|a, b| a.0 == b.0) {
             let tile = part[0].0;
             let first_column = self.columns.len();
@@ -190,9 +155,21 @@ impl<'a> TransportPacker<'a> {
         }
     }
 
-    /// Sorts everything by where it arrives.
+    /// Index of the gate of these doors, which is new if they have none; [`NO_GATE`] without doors.
+    fn gate(&mut self, doors: &[u32]) -> u32 {
+        if doors.is_empty() {
+            return NO_GATE;
+        }
+        let known = self.gates.iter().position(|gate| gate == doors);
+        known.unwrap_or_else(|| {
+            self.gates.push(doors.to_vec());
+            self.gates.len() - 1
+        }) as u32
+    }
+
+    /// Sorts everything by the block and tile where it arrives.
     pub(crate) fn finish(mut self) -> PackedTransport {
-        // What passes no gate comes last: `u32::MAX`.
+        // Entries that pass no gate come last, since `NO_GATE` is the largest number.
         self.pending
             .sort_by_key(|p| (p.target, p.tile, p.gate, p.source));
         let mut packed = PackedTransport {
@@ -200,118 +177,192 @@ impl<'a> TransportPacker<'a> {
             ..PackedTransport::default()
         };
         let mut values = PackedNumbers::new(self.storage);
-        let mut next = 0;
+        let mut rest = &self.pending[..];
         for (target, &shape) in self.shape_of_block.iter().enumerate() {
-            let shape = &self.shapes[shape];
             let first_tile = packed.tiles.len() as u32;
-            for (tile, rows) in shape.row_tiles.iter().enumerate() {
-                let height = usize::from(rows.height);
-                values.fill_line();
-                let first = next;
-                while next < self.pending.len()
-                    && (self.pending[next].target, self.pending[next].tile)
-                        == (BlockRank::new(target), tile as u32)
-                {
-                    next += 1;
-                }
-                let entries = &self.pending[first..next];
-                let numbers = |p: &Pending| &self.values[p.start..][..p.columns.len() * height];
-                let largest = entries
-                    .iter()
-                    .flat_map(numbers)
-                    .fold(0.0f32, |m, x| m.max(x.abs()));
-                let scale = match self.storage {
-                    Storage::Int8 => 1.0,
-                    storage => PackedNumbers::scale(storage, largest),
-                };
-                let first_entry = packed.entries.len() as u32;
-                for entry in entries {
-                    let start = values.len();
-                    for column in numbers(entry).chunks(height) {
-                        let scale = if self.storage == Storage::Int8 {
-                            let largest = column.iter().fold(0.0f32, |m, x| m.max(x.abs()));
-                            let scale = PackedNumbers::scale(Storage::Int8, largest);
-                            packed.column_scales.push(scale);
-                            scale
-                        } else {
-                            scale
-                        };
-                        for &value in column {
-                            values.push(value, scale);
-                        }
-                        packed.multiply_adds += 3 * height;
-                    }
-                    let first = entry.source.get() as u32 * self.block_stride;
-                    let columns = self.columns[entry.columns.clone()].iter();
-                    let columns = columns.map(|&column| first + u32::from(column));
-                    let columns = packed.columns.push(columns);
-                    packed.entries.push(TransportEntry {
-                        source: entry.source,
-                        gate: entry.gate,
-                        columns: columns.start as u32..columns.end as u32,
-                        start: start as u32,
-                    });
-                }
-                let gated = entries.partition_point(|entry| entry.gate != u32::MAX);
-                if let Some(last) = entries[gated..].last() {
-                    // Kernels of 8 and 16 lanes take columns in pairs: a column of zeros makes the run of all that passes no
-                    // gate even.
-                    let columns: usize = entries[gated..].iter().map(|p| p.columns.len()).sum();
-                    if columns % 2 == 1 && self.storage != Storage::Int8 {
-                        let column = last.source.get() as u32 * self.block_stride;
-                        let end = packed.columns.push([column]).end;
-                        packed
-                            .entries
-                            .last_mut()
-                            .expect("the last of these")
-                            .columns
-                            .end = end as u32;
-                        for _ in 0..height {
-                            values.push(0.0, 1.0);
-                        }
-                        packed.multiply_adds += 3 * height;
-                    }
-                }
-                packed.tiles.push(TransportTile {
-                    entries: first_entry..packed.entries.len() as u32,
-                    gated: gated as u32,
-                    scale,
-                    height: rows.height,
-                });
+            for (tile, rows) in (0u32..).zip(&self.shapes[shape].row_tiles) {
+                let is_here = |p: &Pending| p.target.get() == target && p.tile == tile;
+                let (entries, after) = rest.split_at(rest.partition_point(is_here));
+                rest = after;
+                self.pack_tile(entries, rows.height, &mut packed, &mut values);
             }
-            packed
-                .tiles_of_block
-                .push(first_tile..packed.tiles.len() as u32);
+            let tiles = first_tile..packed.tiles.len() as u32;
+            packed.tiles_of_block.push(tiles);
         }
-        let mut pairs: Vec<(BlockRank, BlockRank)> =
-            self.pending.iter().map(|p| (p.source, p.target)).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut at = 0;
-        for source in (0..self.shape_of_block.len()).map(BlockRank::new) {
-            packed.reached_by.push(at as u32);
-            while at < pairs.len() && pairs[at].0 == source {
-                packed.reached.push(pairs[at].1);
-                at += 1;
-            }
-        }
-        packed.reached_by.push(at as u32);
+        self.list_reached(&mut packed);
         packed.values = Some(values);
         packed.gates = self.gates;
         packed
     }
+
+    /// Packs the entries of one tile, whose numbers then begin a cache line.
+    fn pack_tile(
+        &self,
+        entries: &[Pending],
+        height: u8,
+        packed: &mut PackedTransport,
+        values: &mut PackedNumbers,
+    ) {
+        let rows = usize::from(height);
+        values.fill_line();
+        let scale = match self.storage {
+            // Each column has a scale of its own.
+            Storage::Int8 => 1.0,
+            storage => {
+                let numbers = entries.iter().flat_map(|entry| self.numbers(entry, rows));
+                PackedNumbers::scale(storage, largest(numbers))
+            }
+        };
+        let first_entry = packed.entries.len() as u32;
+        for entry in entries {
+            let start = values.len() as u32;
+            for column in self.numbers(entry, rows).chunks(rows) {
+                let scale = match self.storage {
+                    Storage::Int8 => {
+                        let scale = PackedNumbers::scale(Storage::Int8, largest(column));
+                        packed.column_scales.push(scale);
+                        scale
+                    }
+                    _ => scale,
+                };
+                for &value in column {
+                    values.push(value, scale);
+                }
+                packed.multiply_adds += 3 * rows;
+            }
+            let first = entry.source.get() as u32 * self.block_stride;
+            let columns = self.columns[entry.columns.clone()].iter();
+            let columns = columns.map(|&column| first + u32::from(column));
+            let columns = packed.columns.push(columns);
+            packed.entries.push(TransportEntry {
+                source: entry.source,
+                gate: entry.gate,
+                columns: columns.start as u32..columns.end as u32,
+                start,
+            });
+        }
+        let gated = entries.partition_point(|entry| entry.gate != NO_GATE);
+        self.pad_to_pairs(&entries[gated..], rows, packed, values);
+        packed.tiles.push(TransportTile {
+            entries: first_entry..packed.entries.len() as u32,
+            gated: gated as u32,
+            scale,
+            height,
+        });
+    }
+
+    fn numbers(&self, entry: &Pending, rows: usize) -> &[f32] {
+        &self.values[entry.start..][..entry.columns.len() * rows]
+    }
+
+    /// Kernels of 8 and 16 lanes take columns in pairs. If the entries of a tile that pass no gate have an odd number
+    /// of columns, the last entry gets a column of zeros.
+    fn pad_to_pairs(
+        &self,
+        open: &[Pending],
+        rows: usize,
+        packed: &mut PackedTransport,
+        values: &mut PackedNumbers,
+    ) {
+        let columns: usize = open.iter().map(|p| p.columns.len()).sum();
+        if columns.is_multiple_of(2) || self.storage == Storage::Int8 {
+            return;
+        }
+        if let Some(last) = packed.entries.last_mut() {
+            let column = last.source.get() as u32 * self.block_stride;
+            last.columns.end = packed.columns.push([column]).end as u32;
+            for _ in 0..rows {
+                values.push(0.0, 1.0);
+            }
+            packed.multiply_adds += 3 * rows;
+        }
+    }
+
+    /// Lists, by source, the blocks that light reaches.
+    fn list_reached(&self, packed: &mut PackedTransport) {
+        let mut pairs: Vec<(BlockRank, BlockRank)> =
+            self.pending.iter().map(|p| (p.source, p.target)).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        for source in (0..self.shape_of_block.len()).map(BlockRank::new) {
+            let start = pairs.partition_point(|pair| pair.0 < source);
+            packed.reached_by.push(start as u32);
+        }
+        packed.reached_by.push(pairs.len() as u32);
+        packed.reached = pairs.into_iter().map(|pair| pair.1).collect();
+    }
 }
 
-/// What may be left out of the light of so many modes, if nothing else is asked for.
+/// One column of an operator's rows in one tile.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+struct TileColumn {
+    /// Energy of the light that it carries.
+    energy: f64,
+    tile: u32,
+    column: u16,
+}
+
+/// The columns of all tiles of an operator. Energy is that of the light on the receiving walls of unit light on the
+/// sending ones.
+fn tile_columns(to: &PackedShape, from: &PackedShape, operator: &Matrix<f32>) -> Vec<TileColumn> {
+    let mut parts = Vec::new();
+    for (tile, rows) in (0u32..).zip(&to.row_tiles) {
+        let modes = to.modes_of(rows.rows());
+        for column in 0..operator.columns() {
+            let size =
+                |mode: usize| f64::from(to.joint_norms[mode]) * f64::from(operator[(mode, column)]);
+            let sizes = modes.clone().flatten().map(size);
+            let energy: f64 = sizes.map(|size| size * size).sum();
+            let light = f64::from(from.coefficient_norms[column]);
+            parts.push(TileColumn {
+                energy: energy * light * light,
+                tile,
+                column: column as u16,
+            });
+        }
+    }
+    parts
+}
+
+/// The parts, as (tile, column) in ascending order, that remain when the weakest are left out, up to a `share` of the
+/// light in L2. None if there is no light at all.
+fn strongest(mut parts: Vec<TileColumn>, share: f64) -> Vec<(u32, u16)> {
+    let total: f64 = parts.iter().map(|part| part.energy).sum();
+    if total == 0.0 {
+        return Vec::new();
+    }
+    parts.sort_by(|a, b| a.partial_cmp(b).unwrap_or(std::cmp::Ordering::Equal));
+    let mut left_out = 0.0;
+    let first = parts
+        .iter()
+        .position(|part| {
+            left_out += part.energy;
+            left_out > share * share * total
+        })
+        .unwrap_or(0);
+    let kept = parts[first..].iter();
+    let mut kept: Vec<(u32, u16)> = kept.map(|part| (part.tile, part.column)).collect();
+    kept.sort_unstable();
+    kept
+}
+
+fn largest<'n>(numbers: impl IntoIterator<Item = &'n f32>) -> f32 {
+    numbers.into_iter().fold(0.0f32, |m, x| m.max(x.abs()))
+}
+
+/// [`TransportEntry::gate`] of light that passes no gate.
+const NO_GATE: u32 = u32::MAX;
+
+/// Default share of light that may be left out, for a block with `modes` modes.
 fn negligible(modes: usize) -> f32 {
     (0.02 * (32.0 / modes as f32).powi(2)).clamp(0.02, 0.15)
 }
 
-/// Share of a pair's light that is rounding: what mirrors make zero is this small.
+/// Share of a pair's light that is always left out: rounding leaves this much where symmetry would give zero.
 const ROUNDING: f64 = 1e-6;
 
 impl PackedTransport {
-    /// Bytes of operators and of what says where they stand.
+    /// Bytes of numbers and of their lists.
     pub fn bytes(&self) -> usize {
         self.values.as_ref().map_or(0, PackedNumbers::bytes)
             + self.columns.bytes()
@@ -322,13 +373,14 @@ impl PackedTransport {
             + size_of_val(self.reached.as_slice())
     }
 
-    /// Multiply-adds of one product, three channels: of what is kept, with padding, and of dense operators of all pairs.
+    /// Multiply-adds of one product of three channels: with the columns that are kept, padding included; and with dense
+    /// operators of all pairs.
     pub fn multiply_adds(&self) -> [usize; 2] {
         [self.multiply_adds, self.dense_multiply_adds]
     }
 
-    /// The same of what is kept, where only some blocks have light: `is_lit[rank]`, ranks as in
-    /// [`TexelLayout::rank`].
+    /// Multiply-adds of one product of three channels with the columns that are kept, if only blocks with
+    /// `is_lit[rank]` have light.
     ///
     /// # Panics
     /// If there are fewer flags than blocks.
@@ -342,7 +394,7 @@ impl PackedTransport {
         self.tiles.iter().map(of_tile).sum()
     }
 
-    /// Blocks that a block sends light to.
+    /// The blocks that a block sends light to.
     pub(crate) fn reached(&self, block: BlockRank) -> &[BlockRank] {
         let block = block.get();
         &self.reached[self.reached_by[block] as usize..self.reached_by[block + 1] as usize]

@@ -1,4 +1,4 @@
-//! Light of one block where it enters others.
+//! The light of one block where it enters other blocks.
 
 use crate::level::block_index::BlockIndex;
 use crate::modular::path::Roll;
@@ -8,7 +8,7 @@ use mrt_core::linalg::matrix::Matrix;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
-/// Responses of one source, summed by where they enter.
+/// Responses to the light of one source, summed for each way of entering a block.
 pub(crate) type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
 
 /// Where and how light enters a block.
@@ -16,15 +16,15 @@ pub(crate) type Arrivals = BTreeMap<ArrivalKey, Matrix<f32>>;
 pub(crate) struct ArrivalKey {
     /// Doors on the way, ascending.
     pub doors: Vec<u32>,
-    /// The block entered.
+    /// The block that light enters.
     pub block: BlockIndex,
-    /// The canonical face entered.
+    /// The canonical face that light enters by.
     pub face: Face,
     /// True if the response's frame has x and y exchanged.
     pub exchanged: bool,
 }
 
-/// Adds responses to those that enter at the same place.
+/// Adds responses to those with the same key.
 pub(super) fn add(arrivals: &mut Arrivals, key: ArrivalKey, responses: Matrix<f32>) {
     match arrivals.entry(key) {
         Entry::Vacant(entry) => {
@@ -39,13 +39,13 @@ pub(super) fn add(arrivals: &mut Arrivals, key: ArrivalKey, responses: Matrix<f3
     }
 }
 
-/// Responses that enter a block, in the frame of the way they came.
+/// Responses that enter a block, in the frame of their path.
 pub(super) struct Arriving<'a> {
     /// Doors on the way, ascending.
     pub doors: &'a [u32],
-    /// The block entered.
+    /// The block that light enters.
     pub block: BlockIndex,
-    /// The canonical face entered.
+    /// The canonical face that light enters by.
     pub face: Face,
     /// The frame of the responses in the canonical cube of that block.
     pub frame: CubeSymmetry,
@@ -53,11 +53,11 @@ pub(super) struct Arriving<'a> {
     pub parity: &'a [u8],
     /// Response modes x coefficients b of the source.
     pub responses: &'a Matrix<f32>,
-    /// What the responses are multiplied by.
+    /// A factor that multiplies the responses.
     pub factor: f32,
 }
 
-/// Adds responses, brought to the frame without mirrors, to those that enter at the same place.
+/// Brings responses to the frame without mirrors, and adds them to those that enter a block the same way.
 pub(super) fn arrive(arrivals: &mut Arrivals, arriving: Arriving<'_>) {
     let roll = Roll::of(arriving.frame);
     let key = ArrivalKey {
@@ -79,7 +79,7 @@ pub(super) fn arrive(arrivals: &mut Arrivals, arriving: Arriving<'_>) {
     }
 }
 
-/// Doors on the way, with one more if there is one.
+/// A list of doors, ascending, with `door` added if it is new.
 pub(super) fn with_door(doors: &[u32], door: Option<u32>) -> Vec<u32> {
     let mut doors = doors.to_vec();
     if let Some(door) = door
@@ -90,7 +90,7 @@ pub(super) fn with_door(doors: &[u32], door: Option<u32>) -> Vec<u32> {
     doors
 }
 
-/// `first`, then `second`, both maps of directions.
+/// The rotation that applies `first`, then `second`.
 pub(super) fn compose(second: CubeRotation, first: CubeRotation) -> CubeRotation {
     let image = |face: Face| second.face(first.face(face));
     CubeRotation::from_images(image(Face::PosX), image(Face::PosY)).unwrap_or(first)

@@ -1,21 +1,21 @@
-//! What every way of following light reads.
+//! The input of propagation, whichever way light is followed.
 
 use crate::modular::assemble::config::AssembleConfig;
 use crate::modular::dictionary::{Dictionary, OperatorMatrix, ShapeOperators};
 use crate::modular::propagate::transit::Transits;
 use crate::modular::scene::SceneData;
 
-/// A scene whose light is followed, and the operators that it is followed by.
+/// A scene whose light is followed, and the operators that carry it.
 pub(crate) struct PropagationContext<'a, M> {
-    /// Blocks and openings; its transport is not there yet.
+    /// Blocks and openings. Its transport is still empty.
     pub scene: &'a SceneData,
-    /// Paths and lightfields.
+    /// Operators of paths and lightfields.
     pub dictionary: &'a Dictionary<M>,
     /// Operators by [`SceneBlock::shape_index`](crate::modular::scene::SceneBlock::shape_index).
     pub used_shapes: &'a [&'a ShapeOperators<M>],
-    /// How far light is followed, and by which operators.
+    /// How far light is followed, and by which of the operators.
     pub config: &'a AssembleConfig,
-    /// What warped blocks do to light on its way.
+    /// Factors of light that passes through warped blocks.
     pub transits: Transits,
 }
 

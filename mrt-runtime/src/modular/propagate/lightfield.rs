@@ -1,7 +1,8 @@
-//! Transport by lightfields that are passed on from opening to opening, as in the paper.
+//! Transport by lightfields that are passed on from opening to opening, as in the paper (Loos et al. 2011, section
+//! 6.3).
 //!
-//! Sequences that reach an opening with the same set of headings behind them are summed before they go on, since
-//! open rooms have binomially many.
+//! Open rooms have binomially many sequences of openings. So sequences that reach an opening with the same set of
+//! headings are summed before they go on.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::Beyond;
@@ -15,44 +16,44 @@ use mrt_core::geometry::cube_symmetry::CubeSymmetry;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use std::collections::BTreeMap;
 
-/// Light of one source block about to enter a block.
+/// Light of one source block that is about to enter another block.
 struct Wave {
-    /// Takes the entered block's canonical directions to the source's.
+    /// Rotation from the canonical cube of the entered block to that of the source.
     source_from_here: CubeRotation,
     /// Lightfield modes x source modes, in `frame`.
     lightfield: Matrix<f32>,
 }
 
-/// Which waves are summed.
+/// Waves with the same key are summed.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct WaveKey {
     block: BlockIndex,
     entered: Face,
-    /// Headings used so far, as bits of [`Face::index`] in the source's frame.
+    /// Headings so far, as bits of [`Face::index`] in the source's frame.
     headings: u8,
-    /// Takes the canonical interface to the source's directions; free of mirrors, so that what arrives by
-    /// mirrored ways is summed.
+    /// From the canonical interface to the source's directions. It has no mirrors, so that light of mirrored paths is
+    /// summed.
     frame: CubeSymmetry,
-    /// Image of +x and +y of the entered block in the source's frame.
+    /// Directions of +x and +y of the entered block in the source's frame.
     turn: [Face; 2],
-    /// Holes passed so far, two standing for more.
+    /// Number of holes passed so far; 2 stands for two or more.
     holes: usize,
     doors: Vec<u32>,
 }
 
 type Front = BTreeMap<WaveKey, Wave>;
 
-/// Follows light by lightfields, but for paths that the table has.
+/// Follows light by lightfields, along the paths that the table does not have.
 pub(super) struct LightfieldWalk<'a, M> {
     pub context: &'a PropagationContext<'a, M>,
     /// The dictionary's lightfields, decoded.
     pub fields: &'a LightfieldOperators,
-    /// Openings of the longest paths that the table has, by the number of holes on the way (two standing for more).
+    /// Openings of the longest paths in the table, by the number of holes on the way; 2 stands for two or more.
     pub covered: [usize; 3],
 }
 
 impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
-    /// The sum of all light of a block that enters others.
+    /// The sum of all light of a block that enters other blocks.
     pub(super) fn follow(&self, source: BlockIndex) -> Arrivals {
         let mut front = self.emitted(source);
         let mut arrivals = Arrivals::new();
@@ -72,7 +73,7 @@ impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
         arrivals
     }
 
-    /// What leaves the source through its own openings.
+    /// The light that leaves the source through its own openings.
     fn emitted(&self, source: BlockIndex) -> Front {
         let (scene, fields) = (self.context.scene, self.fields);
         let openings = scene.level.blocks[source.get()].shape.openings;
@@ -97,7 +98,7 @@ impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
         front
     }
 
-    /// Adds what a wave becomes in the block that it enters.
+    /// Adds the responses to a wave in the block that it enters.
     fn enter(&self, arrivals: &mut Arrivals, key: &WaveKey, wave: &Wave) {
         let responses = multiply(
             self.fields.response_from_lightfield.view(),
@@ -148,7 +149,8 @@ impl<M: OperatorMatrix> LightfieldWalk<'_, M> {
     }
 }
 
-/// The lightfield at the opening of a cube towards `heading`, and its frame, from that at the opening entered.
+/// Passes a lightfield through a cube, from the opening that it entered by to the opening towards `heading`. Returns
+/// the new frame and lightfield.
 fn through(
     fields: &LightfieldOperators,
     frame: CubeSymmetry,
@@ -174,6 +176,7 @@ fn through(
     (frame, multiply(fields.left.view(), lightfield.view()))
 }
 
+/// Changes the signs of all modes with parities of which `is_odd` is true.
 fn change_signs(lightfield: &mut Matrix<f32>, parity: &[u8], is_odd: impl Fn(u8) -> bool) {
     let rows = lightfield.rows().max(1);
     for column in lightfield.data_mut().chunks_exact_mut(rows) {
@@ -185,7 +188,7 @@ fn change_signs(lightfield: &mut Matrix<f32>, parity: &[u8], is_odd: impl Fn(u8)
     }
 }
 
-/// A lightfield at an opening of a block, on its way out.
+/// A lightfield that leaves a block through an opening.
 struct Sent<'a> {
     block: BlockIndex,
     exit: Face,

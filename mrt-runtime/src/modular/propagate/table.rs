@@ -1,8 +1,7 @@
 //! Transport by whole paths: a lookup and a sum for each sequence of openings.
 //!
-//! Every path from an opening is followed for as long as its word is in the dictionary. In an open room there are
-//! binomially many, which bounds the depth of a table rather than that of a level: adding one costs the additions
-//! of one small matrix.
+//! Every path from an opening is followed as long as its word is in the table. An open room has binomially many paths;
+//! that limits the depth of a table. In a level, each path only costs the addition of one small matrix.
 
 use crate::level::block_index::BlockIndex;
 use crate::level::placed::{Beyond, PlacedBlock};
@@ -19,43 +18,51 @@ use mrt_core::linalg::matrix::{Matrix, multiply};
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// The operators of the paths that a scene has, brought to its sources.
+/// Follows light by the dictionary's table of paths.
 pub(super) struct Table<'a, M> {
     context: &'a PropagationContext<'a, M>,
-    /// Responses from coefficients.
+    /// Responses from coefficients b, response modes x modes.
     cache: HashMap<CacheKey, Rc<Matrix<f32>>>,
 }
 
-/// Shape, opening, word, and the frame's roll.
-type CacheKey = (usize, usize, usize, bool, u8);
+/// What the responses of a path depend on.
+#[derive(PartialEq, Eq, Hash)]
+struct CacheKey {
+    shape: usize,
+    opening: usize,
+    /// Position of the path's word in the table.
+    word: usize,
+    roll: Roll,
+}
 
-/// A path up to the block that it has just entered.
+/// A path from its source to the block that it has just entered.
 #[derive(Clone)]
 struct Path {
     word: Word,
     block: BlockIndex,
-    /// The canonical face entered.
+    /// The canonical face that it entered by.
     entered: Face,
-    /// Takes the entered block's canonical directions to the source's.
+    /// Rotation from the canonical cube of the entered block to that of the source.
     source_from_here: CubeRotation,
-    /// Headings of the word's x and y in the source's frame, as far as they are used.
+    /// Heading of the word's x in the source's frame; `None` before it is used.
     x: Option<Face>,
+    /// Heading of the word's y in the source's frame; `None` before it is used.
     y: Option<Face>,
+    /// Doors on the way, ascending.
     doors: Vec<u32>,
-    /// Product of the transits so far.
+    /// Product of the factors of the blocks on the way.
     factor: f32,
 }
 
-/// All paths from a block whose words are in a table.
+/// Follows all paths from one opening of a block whose words are in the table.
 struct Walk<'a, M> {
     blocks: &'a [PlacedBlock],
     paths: &'a PathTable<M>,
-    /// What a warped block does to light that enters by one face and leaves by another; `None` where only the words
-    /// matter.
+    /// Factor of light that enters a block by one face and leaves by another; `None` if only words matter.
     transit: Option<&'a dyn Fn(BlockIndex, Face, Face) -> f32>,
     max_depth: usize,
     source: BlockIndex,
-    /// Position in the source shape's openings of the first one crossed.
+    /// Position, in the openings of the source's shape, of the first opening that paths cross.
     opening: usize,
 }
 
@@ -68,7 +75,7 @@ impl<M> Clone for Walk<'_, M> {
 impl<M> Copy for Walk<'_, M> {}
 
 impl<M> Walk<'_, M> {
-    /// Gives `visit` each path with its word's position in the table.
+    /// Calls `visit` with each path and the position of its word in the table.
     fn follow(self, visit: &mut impl FnMut(usize, &Path)) -> Result<(), AssembleError> {
         let start = Path {
             word: Word::default(),
@@ -83,12 +90,27 @@ impl<M> Walk<'_, M> {
         self.cross(self.first(), &start, visit)
     }
 
-    /// The face of the source that paths leave by.
+    /// The face of the source that paths leave by, which is also their first heading.
     fn first(self) -> Face {
         self.blocks[self.source.get()].shape.openings[self.opening].face
     }
 
-    /// Goes on through a face of the block that a path has reached.
+    /// Position of a word in the table; `None` where the table ends. An error if the word was packed away.
+    fn position(self, word: &Word) -> Result<Option<usize>, AssembleError> {
+        let entries = &self.paths.entries;
+        let found = entries.binary_search_by(|entry| entry.word.cmp(word));
+        if found.is_err() && self.paths.whole_table_has(word) {
+            let source = self.source.get();
+            return Err(AssembleError::MissingPath {
+                block: source,
+                face: self.blocks[source].orientation.face(self.first()),
+                word: word.name(),
+            });
+        }
+        Ok(found.ok())
+    }
+
+    /// Continues a path through a face of the block that it has reached.
     fn cross(
         self,
         exit: Face,
@@ -105,43 +127,20 @@ impl<M> Walk<'_, M> {
             return Ok(());
         };
         let first = self.first();
-        let heading = path.source_from_here.face(exit);
-        let (mut x, mut y) = (path.x, path.y);
-        let letter = if heading == first {
-            Face::PosZ
-        } else if x.is_none() || x == Some(heading) {
-            x = Some(heading);
-            Face::PosX
-        } else {
-            y = Some(heading);
-            Face::PosY
-        };
-        let hole = here.shape.opening(exit).and_then(|o| hole_of(o.outline));
-        let word = path.word.then(Crossing {
-            heading: letter,
-            hole,
-        });
-        let entries = &self.paths.entries;
-        let Ok(index) = entries.binary_search_by(|entry| entry.word.cmp(&word)) else {
-            return if self.paths.whole_table_has(&word) {
-                Err(AssembleError::MissingPath {
-                    block: self.source.get(),
-                    face: self.blocks[self.source.get()].orientation.face(first),
-                    word: word.name(),
-                })
-            } else {
-                Ok(())
-            };
-        };
-        let next = Path {
-            word,
+        let mut next = Path {
             block,
             entered,
             source_from_here: compose(path.source_from_here, here_from_there),
-            x,
-            y,
             doors: with_door(&path.doors, here.doors[exit.index()]),
-            factor: path.factor,
+            ..path.clone()
+        };
+        let heading = path.source_from_here.face(exit);
+        next.word = path.word.then(Crossing {
+            heading: next.letter(heading, first),
+            hole: here.shape.opening(exit).and_then(|o| hole_of(o.outline)),
+        });
+        let Some(index) = self.position(&next.word)? else {
+            return Ok(());
         };
         visit(index, &next);
         if next.word.crossings().len() >= self.max_depth {
@@ -165,7 +164,23 @@ impl<M> Walk<'_, M> {
     }
 }
 
-/// Which entries of a table the paths of a level have, whatever its depth.
+impl Path {
+    /// The heading, in the word, of a crossing with a heading in the source's frame. A heading that no crossing had
+    /// before becomes the word's x or y.
+    fn letter(&mut self, heading: Face, first: Face) -> Face {
+        if heading == first {
+            Face::PosZ
+        } else if self.x.is_none() || self.x == Some(heading) {
+            self.x = Some(heading);
+            Face::PosX
+        } else {
+            self.y = Some(heading);
+            Face::PosY
+        }
+    }
+}
+
+/// By entry of a table: whether a path of the level, of any depth, has it.
 pub(crate) fn used_paths<M>(
     blocks: &[PlacedBlock],
     paths: &PathTable<M>,
@@ -195,7 +210,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
         }
     }
 
-    /// All light of a block that enters others.
+    /// The sum of all light of a block that enters other blocks.
     pub(super) fn follow(&mut self, source: BlockIndex) -> Result<Arrivals, AssembleError> {
         let mut arrivals = Arrivals::new();
         let context = self.context;
@@ -234,7 +249,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
         Ok(arrivals)
     }
 
-    /// The path's operator times the emission of the source's shape in the path's frame.
+    /// The operator of a path times the emission of the source in the frame of the path.
     fn responses(
         &mut self,
         source: BlockIndex,
@@ -244,7 +259,12 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     ) -> Rc<Matrix<f32>> {
         let shape = self.context.scene.blocks[source.get()].shape_index;
         let roll = Roll::of(frame);
-        let key = (shape, opening, word, roll.exchanged, roll.mirrors);
+        let key = CacheKey {
+            shape,
+            opening,
+            word,
+            roll,
+        };
         let paths = &self.context.dictionary.paths;
         let used = self.context.used_shapes[shape];
         self.cache
@@ -252,7 +272,7 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
             .or_insert_with(|| {
                 let operators = &used.openings[opening];
                 let exchanged = usize::from(roll.exchanged);
-                // Without vertical openings every frame keeps up, and there is one.
+                // In sets without vertical openings, +y stays up in every frame, and there is only one operator.
                 let emission = operators
                     .emission_from_coefficients
                     .get(exchanged)
@@ -268,7 +288,8 @@ impl<'a, M: OperatorMatrix> Table<'a, M> {
     }
 }
 
-/// The path's canonical frame in the source's: headings that it does not use are those of the opening's frame.
+/// From the canonical frame of a path to the source's. Headings that the path does not use are those of the opening's
+/// reference frame.
 fn path_frame(first: Face, x: Option<Face>, y: Option<Face>) -> CubeSymmetry {
     let reference = frame_of_heading(first);
     let (side, up) = (reference.face(Face::PosX), reference.face(Face::PosY));

@@ -1,7 +1,7 @@
-//! Light that passes through a warped block on its way: how much less of the opening that it entered by the
-//! next one sees, or how much more, than in the unit cube that paths are made of.
+//! Light that passes through a warped block on its way. Operators of paths are made of unit cubes; a factor corrects
+//! how much of the light that entered by one opening leaves through the next.
 //!
-//! Of even light that factor is exact. How light spreads over the next opening stays that of the cube.
+//! For even light, the factor is exact. The distribution of light over the next opening stays that of the cube.
 
 use crate::level::placed::PlacedBlock;
 use crate::level::shape::Aperture;
@@ -12,11 +12,11 @@ use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::form_factor::{HalfSpace, clip_polygon, point_to_polygon};
 use mrt_core::geometry::hexahedron::Hexahedron;
 
-/// Factors by the faces entered and left.
+/// Factors by the face that light enters by, then the face that it leaves by.
 type Factors = [[f32; 6]; 6];
 
-/// Factors of the blocks whose operators were made for their warp; blocks with canonical operators pass light on
-/// as cubes.
+/// By shape of a scene: factors of blocks whose operators were made for their warp. Blocks with canonical operators
+/// count as cubes.
 pub(crate) struct Transits(Vec<Option<Factors>>);
 
 impl Transits {
@@ -37,7 +37,7 @@ impl Transits {
         Self(factors.collect())
     }
 
-    /// What light that entered a block of a shape through one face and leaves through another is multiplied by.
+    /// Factor of light that enters a block of a shape by one face and leaves by another.
     pub(super) fn factor(&self, shape_index: usize, entered: Face, left: Face) -> f32 {
         self.0[shape_index]
             .as_ref()
@@ -60,8 +60,8 @@ fn factors(block: &PlacedBlock) -> Factors {
     factors
 }
 
-/// Points along each axis of the opening over which a form factor is averaged: 24 instead change
-/// the factors of boxes up to 1:4 by less than 0.1 %.
+/// Number of points along each axis of an opening at which form factors are averaged. With 24 instead, the factors of
+/// boxes up to 1:4 change by less than 0.1 %.
 const POINTS: usize = 12;
 
 /// Mean form factor from one opening of a warped cube to another.

@@ -1,12 +1,14 @@
-//! Frames cut into parts, by slices, threads or the order of blocks, show the same light.
+//! Frames that are cut into parts, by slices or threads or the order of blocks, show the same light.
 
 use glam::Vec3;
 use mrt_runtime::blocks::{Block, maze};
 use mrt_runtime::executor::Executor;
 use mrt_runtime::{Bounces, Frame, FrameConfig, Level, Light, Outputs, ProbeOrder, Scene};
-use mrt_tests::FrameForTests;
-use mrt_tests::sequences::{difference, mobile, random_level, random_lights, random_position};
-use mrt_tests::{Random, by_texel, floor_plan, largest_difference, sphere};
+use mrt_tests::{
+    FrameForTests, Random, by_texel, corridor, difference, floor_plan, largest_apart,
+    largest_difference, mobile, random_level, random_lights, random_position, relative_difference,
+    solved, with_outputs,
+};
 use std::num::NonZero;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,19 +26,16 @@ fn sliced(scene: &Scene, slice: usize) -> Frame {
     Frame::new(scene, config)
 }
 
-/// Moving lamps of about a watt, so that no channel needs to be scaled down.
+/// A lamp of about a watt at a random place: not bright enough for a channel to be scaled down.
 fn lamp(random: &mut Random, level: &Level) -> Light {
-    sphere(
-        random_position(random, level),
-        0.3,
-        Vec3::new(1.0, 0.5, 0.25),
-    )
+    let position = random_position(random, level, 0.0);
+    Light::sphere(position, 0.3, Vec3::new(1.0, 0.5, 0.25))
 }
 
-/// One bounce: once lights stand still, direct light waits for `blocks / slice` frames, and indirect light as long again.
-/// Where what was there before was more light than now, it was scaled down meanwhile, and a third round sets that right.
+/// Once lights stand still, direct light is complete after `blocks / slice` frames, and one bounce after as many frames
+/// again. If there was more light before, light was scaled down meanwhile, and a third round corrects this.
 #[test]
-fn slices_show_the_same_light_in_the_end() {
+fn slices_show_the_same_light_after_as_many_frames_as_stated() {
     for seed in 0..20 {
         let mut random = Random(seed);
         let blocks = 1 + random.below(40);
@@ -44,25 +43,21 @@ fn slices_show_the_same_light_in_the_end() {
         let scene = mobile(&level);
         for slice in [1, 3, 16, 1000] {
             let mut frame = sliced(&scene, slice);
-            // Whatever was before.
+            // Some light that was there before.
             for _ in 0..random.below(6) {
                 let lights = [lamp(&mut random, &level), lamp(&mut random, &level)];
                 frame.light_with(&lights, Bounces::Count(1));
             }
             let lights = [lamp(&mut random, &level)];
-            let mut expected = Frame::new(&scene, FrameConfig::default());
-            expected.light_with(&lights, Bounces::Count(1));
+            let expected = solved(&scene, &lights, Bounces::Count(1));
             let mut needed = 0;
             let mut frames = 0;
             let mut limited = 0;
             while frames < 3 * blocks.div_ceil(slice) {
                 frame.light_with(&lights, Bounces::Count(1));
-                assert!(
-                    frame.last_report().work().targets <= slice
-                        && frame.last_report().work().direct <= slice
-                );
+                assert!(frame.work().targets <= slice && frame.work().direct <= slice);
                 frames += 1;
-                limited += usize::from(frame.last_report().work().limited > 0);
+                limited += usize::from(frame.work().limited > 0);
                 if difference(&frame, &expected).is_some() {
                     needed = frames + 1;
                 }
@@ -80,8 +75,8 @@ fn slices_show_the_same_light_in_the_end() {
     }
 }
 
-/// What a block shows is what it showed without slices in one of the last `blocks / slice` frames, whatever light falls
-/// where: the oldest waits no longer. Direct light is the caller's here, so that only bounces wait.
+/// In slices, a block shows light that it showed without slices in one of the last `blocks / slice` frames, however light
+/// changes. Direct light is the caller's here, so that only bounces wait.
 #[test]
 fn no_block_waits_longer_than_stated() {
     for (blocks, slice) in [(12, 1), (12, 5), (30, 4), (30, 29)] {
@@ -93,7 +88,7 @@ fn no_block_waits_longer_than_stated() {
         let mut history: Vec<Vec<f32>> = Vec::new();
         let mut oldest = 0;
         for step in 0..120 {
-            // About as much light in every frame, else what waits is scaled down with what there is.
+            // The amount of light hardly changes between frames; otherwise blocks that wait would be scaled down.
             let light = |_| 1.0 + 0.05 * random.unit() as f32;
             let direct: Vec<f32> = (0..3 * scene.texel_count()).map(light).collect();
             for frame in [&mut frame, &mut unsliced] {
@@ -106,7 +101,7 @@ fn no_block_waits_longer_than_stated() {
                 let shown = &shown[range.clone()];
                 let age = (0..history.len())
                     .find(|age| history[history.len() - 1 - age][range.clone()] == *shown);
-                // Dark until its first turn.
+                // A block is dark until its first turn.
                 let first = step < stated && shown.iter().all(|&e| e == 0.0);
                 match age {
                     Some(age) => oldest = oldest.max(age),
@@ -119,12 +114,11 @@ fn no_block_waits_longer_than_stated() {
     }
 }
 
-/// A lamp that moves changes next to nothing at the other end of a long corridor, where another stands still.
+/// Two lamps are at the two ends of a long corridor, and only one of them moves.
 #[test]
 fn in_slices_light_that_stands_still_is_not_dimmed() {
-    let cells: Vec<[i32; 2]> = mrt_tests::corridor(30);
-    let scene = mobile(&floor_plan(&cells, 0.5));
-    let lamp = |x: f32| sphere(Vec3::new(x, 0.5, 0.5), 0.3, Vec3::ONE);
+    let scene = mobile(&floor_plan(&corridor(30), 0.5));
+    let lamp = |x: f32| Light::sphere(Vec3::new(x, 0.5, 0.5), 0.3, Vec3::ONE);
     let mut frame = sliced(&scene, 4);
     let of_first = 0..3 * scene.level.blocks[0].texels.end;
     let mut still = None;
@@ -135,11 +129,8 @@ fn in_slices_light_that_stands_still_is_not_dimmed() {
         if step == 29 {
             still = Some(now);
         } else if let Some(still) = &still {
-            // Down the straight corridor the lamp that moves makes 1e-4 of this light. Dimming took a quarter of it.
-            let apart = now
-                .iter()
-                .zip(still)
-                .fold(0.0f32, |m, (a, b)| m.max((a - b).abs()));
+            // The lamp that moves makes 1e-4 of this light. Without care, frames in slices would dim it by a quarter.
+            let apart = largest_apart(&now, still);
             let brightest = still.iter().fold(0.0f32, |m, &e| m.max(e));
             assert!(
                 apart < 1e-3 * brightest,
@@ -149,7 +140,7 @@ fn in_slices_light_that_stands_still_is_not_dimmed() {
     }
 }
 
-/// Feedback in slices comes to the same light, but for rounding, which keeps both in motion. Measured: 7e-8 apart.
+/// Rounding keeps both frames in motion. Measured: 7e-8 apart.
 #[test]
 fn feedback_in_slices_converges_to_the_same_light() {
     const BOUND: f64 = 1e-6;
@@ -165,38 +156,41 @@ fn feedback_in_slices_converges_to_the_same_light() {
         let mut frame = sliced(&scene, slice);
         for _ in 0..limit * blocks.div_ceil(slice) {
             frame.light_with(&lights, Bounces::Feedback);
-            assert!(frame.last_report().work().targets <= slice);
+            assert!(frame.work().targets <= slice);
         }
-        let apart = largest_difference(
-            &by_texel(&scene, &frame.indirect()),
-            &by_texel(&scene, &expected.indirect()),
-        );
+        let apart = relative_difference(&frame.indirect(), &expected.indirect());
         println!("{blocks} blocks, slices of {slice}: {apart:.1e} apart");
         assert!(apart < BOUND, "{apart}");
     }
 }
 
-/// Runs tasks on so many threads, each taking the last one that is left; with none, backwards on the caller's.
+/// Runs tasks in reverse order: on threads that each take the last task that is left, or on the caller's thread if there are
+/// no others.
 #[derive(Debug)]
-struct Backwards(usize, AtomicUsize);
+struct Backwards {
+    threads: usize,
+    /// Tasks so far.
+    tasks: AtomicUsize,
+}
 
 impl Executor for Backwards {
     fn workers(&self) -> usize {
-        self.0.max(2)
+        self.threads.max(2)
     }
 
     fn run(&self, tasks: usize, task: &(dyn Fn(usize) + Sync)) {
-        self.1.fetch_add(tasks, Ordering::Relaxed);
-        if self.0 == 0 {
+        self.tasks.fetch_add(tasks, Ordering::Relaxed);
+        if self.threads == 0 {
             (0..tasks).rev().for_each(task);
             return;
         }
         let left = AtomicUsize::new(tasks);
+        let take_last = |k: usize| k.checked_sub(1);
         std::thread::scope(|scope| {
-            for _ in 0..self.0 {
+            for _ in 0..self.threads {
                 scope.spawn(|| {
-                    while let Ok(k) = left
-                        .fetch_update(Ordering::Relaxed, Ordering::Relaxed, |k| k.checked_sub(1))
+                    while let Ok(k) =
+                        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, take_last)
                     {
                         task(k - 1);
                     }
@@ -213,27 +207,26 @@ const ALL_OUTPUTS: Outputs = Outputs {
 };
 
 #[test]
-fn threads_change_no_bit() {
+fn the_number_of_threads_changes_no_bit() {
     for seed in 0..6 {
         let mut random = Random(seed);
         let level = random_level(&mut random, 60);
         let scene = mobile(&level);
         let executors: Vec<Arc<Backwards>> = [0, 1, 2, 3, 7, 64]
             .into_iter()
-            .map(|workers| Arc::new(Backwards(workers, AtomicUsize::new(0))))
+            .map(|threads| {
+                Arc::new(Backwards {
+                    threads,
+                    tasks: AtomicUsize::new(0),
+                })
+            })
             .collect();
         let config = |executor: &Arc<Backwards>| FrameConfig {
             outputs: ALL_OUTPUTS,
             executor: executor.clone(),
             ..FrameConfig::default()
         };
-        let mut serial = Frame::new(
-            &scene,
-            FrameConfig {
-                outputs: ALL_OUTPUTS,
-                ..FrameConfig::default()
-            },
-        );
+        let mut serial = with_outputs(&scene, ALL_OUTPUTS);
         let mut frames: Vec<Frame> = executors
             .iter()
             .map(|executor| Frame::new(&scene, config(executor)))
@@ -252,16 +245,16 @@ fn threads_change_no_bit() {
                 frame.light_with(&lights, bounces);
                 let apart = difference(frame, &serial);
                 assert_eq!(apart, None, "seed {seed}, {bounces:?}, {executor:?}");
-                assert_eq!(frame.last_report().work(), serial.last_report().work());
+                assert_eq!(frame.work(), serial.work());
             }
         }
         for executor in &executors {
-            assert!(executor.1.load(Ordering::Relaxed) > 0, "{executor:?}");
+            assert!(executor.tasks.load(Ordering::Relaxed) > 0, "{executor:?}");
         }
     }
 }
 
-/// Has more workers each time when asked, as a pool that a frame was not made in.
+/// Has more workers whenever it is asked, like a pool of threads that grows after the frame was made.
 #[derive(Debug, Default)]
 struct Growing(AtomicUsize);
 
@@ -295,7 +288,7 @@ fn an_executor_that_grows_loses_no_block() {
     }
 }
 
-/// Sums over sources come in another order: a few roundings of `f32`. Measured: 2e-7, over twenty bounces.
+/// Tolerance for sums of `f32` over sources in another order. Measured over twenty bounces: 2e-7.
 const REORDERED: f64 = 2e-6;
 
 /// The level with its blocks in another order: block k of the result is block `order[k]`.
@@ -324,17 +317,11 @@ fn the_order_of_blocks_does_not_matter() {
         let scene = mobile(&level);
         let lights = random_lights(&mut random, &level, &scene, 5);
         let mut order: Vec<usize> = (0..blocks).collect();
-        for k in (1..blocks).rev() {
-            order.swap(k, random.below(k + 1));
-        }
+        random.shuffle(&mut order);
         let other = mobile(&reordered(&level, &order));
         for bounces in [Bounces::Count(1), Bounces::Count(20)] {
-            let mut frame = Frame::new(&scene, FrameConfig::default());
-            frame.light_with(&lights, bounces);
-            let mut turned = Frame::new(&other, FrameConfig::default());
-            turned.light_with(&lights, bounces);
-            let expected = by_texel(&scene, &frame.indirect());
-            let found = by_texel(&other, &turned.indirect());
+            let lit = |scene: &Scene| by_texel(scene, &solved(scene, &lights, bounces).indirect());
+            let (expected, found) = (lit(&scene), lit(&other));
             let mut in_order = vec![[0.0; 3]; found.len()];
             for (k, &block) in order.iter().enumerate() {
                 let (to, from) = (
@@ -352,12 +339,11 @@ fn the_order_of_blocks_does_not_matter() {
 }
 
 #[test]
-fn a_slice_of_one_block_is_a_whole_frame() {
-    let scene = mobile(&floor_plan(&[[0, 0]], 0.5));
+fn a_slice_as_large_as_the_level_is_a_whole_frame() {
+    let scene = mobile(&floor_plan(&corridor(1), 0.5));
+    let lights = [Light::sphere(Vec3::splat(0.4), 0.1, Vec3::ONE)];
     let mut frame = sliced(&scene, 1);
-    let lights = [sphere(Vec3::splat(0.4), 0.1, Vec3::ONE)];
     frame.light_with(&lights, Bounces::Count(1));
-    let mut expected = Frame::new(&scene, FrameConfig::default());
-    expected.light_with(&lights, Bounces::Count(1));
+    let expected = solved(&scene, &lights, Bounces::Count(1));
     assert_eq!(difference(&frame, &expected), None);
 }

@@ -1,8 +1,8 @@
-//! How well each level of transport serves a warped block, against F of the warped walls.
+//! Errors of canonical, re-gathered and rebuilt transport in warped blocks, against F of the warped walls.
 //!
-//! Prints a table (`cargo test --release -p mrt-tests --test warped_transport -- --nocapture`). Errors
-//! are of the first bounce of [`LIGHTS`] mid lights at 16² and 32 modes, so they hold what the reduction costs and
-//! nothing of the texel grid.
+//! Prints a table (`cargo test --release -p mrt-tests --test modular warped::transport -- --nocapture`). Errors are those of
+//! the first bounce of [`LIGHTS`] lights at 16² texels and 32 modes. Both sides have the same texels, so errors are those of
+//! the reduction to modes.
 
 use mrt_core::geometry::hexahedron::Hexahedron;
 use mrt_core::linalg::matrix::{Matrix, multiply};
@@ -15,15 +15,18 @@ use mrt_tests::warped::*;
 
 const LIGHTS: u32 = 40;
 
-/// Statistics of one level over the lights, in percent.
+/// Errors of one transport over all lights, in percent.
 struct Row {
-    /// Relative L2 by area: median and mean; the same by texel: median.
+    /// Relative L2 error weighted by area, median.
     l2: f64,
+    /// Relative L2 error weighted by area, mean.
     l2_mean: f64,
+    /// Relative L2 error, median.
     l2_unweighted: f64,
-    /// Total irradiance by area, and by texel, against the true one: mean over the lights of the deviation.
-    level: f64,
-    level_unweighted: f64,
+    /// Deviation of the sum of irradiance weighted by area, mean.
+    sum: f64,
+    /// Deviation of the sum of irradiance, mean.
+    sum_unweighted: f64,
 }
 
 fn row(found: &Matrix<f64>, truth: &Matrix<f64>, areas: &[f64]) -> Row {
@@ -33,7 +36,7 @@ fn row(found: &Matrix<f64>, truth: &Matrix<f64>, areas: &[f64]) -> Row {
             .map(|j| 100.0 * rel_l2_by(weights, found.column(j), truth.column(j)))
             .collect()
     };
-    let level = |weights: &[f64]| {
+    let sum = |weights: &[f64]| {
         let each: Vec<f64> = (0..truth.columns())
             .map(|j| total(weights, found.column(j)) / total(weights, truth.column(j)) - 1.0)
             .collect();
@@ -43,12 +46,12 @@ fn row(found: &Matrix<f64>, truth: &Matrix<f64>, areas: &[f64]) -> Row {
         l2: median(l2(areas)),
         l2_mean: mean(&l2(areas)),
         l2_unweighted: median(l2(&ones)),
-        level: level(areas),
-        level_unweighted: level(&ones),
+        sum: sum(areas),
+        sum_unweighted: sum(&ones),
     }
 }
 
-/// Measures and prints one block.
+/// Errors of the three transports of one block, printed as a row of the table.
 fn measured(name: &str, shape: &Shape, warp: &Hexahedron) -> [Row; 3] {
     let canonical = canonical(shape);
     let block = warped(shape, &canonical, warp);
@@ -67,7 +70,7 @@ fn measured(name: &str, shape: &Shape, warp: &Hexahedron) -> [Row; 3] {
     for r in &rows {
         print!(
             "| {:.1} / {:.1} / {:.1} | {:+.1} / {:+.1} ",
-            r.l2, r.l2_mean, r.l2_unweighted, r.level, r.level_unweighted
+            r.l2, r.l2_mean, r.l2_unweighted, r.sum, r.sum_unweighted
         );
     }
     let guess = 100.0 * guessed_error(warp);
@@ -76,7 +79,7 @@ fn measured(name: &str, shape: &Shape, warp: &Hexahedron) -> [Row; 3] {
         100.0 * estimate.reused,
         100.0 * estimate.regathered
     );
-    // Other lights, fewer of them, and a seventh of the texels.
+    // The estimate uses other and fewer lights, and a seventh of the texels.
     for (found, expected) in [
         (100.0 * estimate.reused, rows[0].l2),
         (100.0 * estimate.regathered, rows[1].l2),
@@ -87,11 +90,12 @@ fn measured(name: &str, shape: &Shape, warp: &Hexahedron) -> [Row; 3] {
     rows
 }
 
-/// Percent by which the median L2 error may lie above what is documented here: nothing random is left, so
-/// this is room for changes elsewhere in the bake.
+/// Percent by which a median L2 error may exceed the documented error. Nothing here is random; this is room for changes
+/// elsewhere in the bake.
 const ROOM: f64 = 1.5;
 
-fn holds(name: &str, shape: &Shape, warp: &Hexahedron, documented: [f64; 3]) -> [Row; 3] {
+/// Checks the median L2 errors of the three transports against the documented ones.
+fn check(name: &str, shape: &Shape, warp: &Hexahedron, documented: [f64; 3]) -> [Row; 3] {
     let rows = measured(name, shape, warp);
     for (row, documented) in rows.iter().zip(documented) {
         assert!(
@@ -100,21 +104,21 @@ fn holds(name: &str, shape: &Shape, warp: &Hexahedron, documented: [f64; 3]) -> 
             row.l2
         );
     }
-    // Where nothing is warped all three are the same.
+    // In a cube all three are the same.
     assert!(
         rows[1].l2 < rows[0].l2 + 0.5,
-        "{name}: re-gather is no better than reuse"
+        "{name}: re-gathered is no better than canonical"
     );
     assert!(
         rows[2].l2 < rows[1].l2 + 0.5,
-        "{name}: rebuild is no better than re-gather"
+        "{name}: rebuilt is no better than re-gathered"
     );
     rows
 }
 
 fn heading() {
     println!(
-        "| block | reuse L2 median / mean / by texel | level by area / texel | re-gather L2 | level | rebuild L2 | level | estimate | guess |"
+        "| block | canonical L2 median / mean / by texel | sum by area / texel | re-gathered L2 | sum | rebuilt L2 | sum | estimate | guess |"
     );
 }
 
@@ -130,25 +134,25 @@ fn stretched_boxes_keep_their_documented_errors() {
         (5.0, [57.5, 31.8, 10.2]),
         (20.0, [86.3, 74.1, 10.3]),
     ] {
-        let rows = holds(
+        let rows = check(
             &format!("1:1:{a}"),
             closed,
             &stretched([1.0, 1.0, a]),
             documented,
         );
-        // What arrives in all. Reuse hands the short walls what the long ones should get; counted by
-        // texel, as if all had one area, that shows less.
+        // The sum of irradiance. Canonical operators give short walls the light that long walls should get. Weights by area
+        // show this more than equal weights.
         let bound = if a > 5.0 {
             [40.0, 5.0, 0.1]
         } else {
             [20.0, 5.0, 0.1]
         };
         for (row, bound) in rows.iter().zip(bound) {
-            assert!(row.level.abs() < bound, "1:1:{a}: {}", row.level);
+            assert!(row.sum.abs() < bound, "1:1:{a}: {}", row.sum);
         }
     }
     for (a, documented) in [(2.0, [22.1, 9.4, 4.2]), (5.0, [58.1, 35.1, 11.3])] {
-        holds(
+        check(
             &format!("1:{a}:{a}"),
             closed,
             &stretched([1.0, a, a]),
@@ -174,12 +178,12 @@ fn sheared_and_bent_blocks_keep_their_documented_errors() {
         ("frustum 0.5", frustum(0.5), [17.1, 7.8, 4.7]),
         ("twist 45", twisted(45.0), [9.7, 8.1, 5.1]),
     ] {
-        holds(name, closed, &warp, documented);
+        check(name, closed, &warp, documented);
     }
 }
 
-/// Reuse is at its worst here: openings that grow or shrink against the walls change how much light stays
-/// in the block, by -33 % in the longer corridor and +51 % in the tee. Re-gather knows.
+/// Canonical operators are at their worst here. Openings that grow or shrink relative to the walls change how much light
+/// stays in the block, by -33 % in the longer corridor and +51 % in the tee. Re-gathered operators include this.
 #[test]
 fn open_blocks_keep_their_documented_errors() {
     heading();
@@ -189,7 +193,7 @@ fn open_blocks_keep_their_documented_errors() {
         ("tee", [1.0, 2.0, 1.0], [55.5, 1.6, 0.5]),
     ] {
         let shape = Shape::from_name(name).expect("a shape of the dictionary");
-        holds(
+        check(
             &format!("{name} {size:?}"),
             shape,
             &stretched(size),

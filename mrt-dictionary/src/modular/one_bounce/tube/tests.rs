@@ -1,15 +1,16 @@
 //! Physics of the tubes' one-bounce operator.
 
 use super::*;
+use crate::modular::one_bounce::rays::ray_traced_tube_bounce;
 use mrt_core::geometry::form_factor::point_to_polygon;
 use mrt_core::linalg::matrix::multiply;
 
-fn bounce(form: TubeForm, resolution: usize, parts: Parts) -> Matrix<f64> {
-    tube_bounce(form, resolution, parts, &Progress::silent()).expect("nobody cancels")
+fn bounce(wall: &TubeWall, parts: Parts) -> Matrix<f64> {
+    tube_bounce(wall, parts, &Progress::silent()).expect("nobody cancels")
 }
 
 /// Form factor of a disc opening of the straight tube, which every point of the wall sees whole: Lambert's
-/// formula on a polygon of so many sides that its area is short of the disc's by 2e-6 of it.
+/// formula on a polygon of 2048 sides, whose area is short of the disc's by 2e-6 of it.
 fn disc_factor(at: &SurfacePoint, opening: Face) -> f64 {
     const SIDES: usize = 2048;
     let x = if opening.is_positive() { 1.0 } else { 0.0 };
@@ -24,8 +25,8 @@ fn disc_factor(at: &SurfacePoint, opening: Face) -> f64 {
 }
 
 /// Light that varies over the tube like a lamp somewhere in it.
-fn smooth_light(form: TubeForm, resolution: usize) -> Matrix<f64> {
-    let texels = tube_texels(form, resolution);
+fn smooth_light(wall: &TubeWall) -> Matrix<f64> {
+    let texels = &wall.texels;
     let lamp = DVec3::new(0.6, 0.6, 0.55);
     Matrix::from_fn(texels.len(), 1, |k, _| {
         let offset = lamp - texels[k].center.position;
@@ -46,11 +47,9 @@ fn relative_error(a: &Matrix<f64>, b: &Matrix<f64>) -> f64 {
 #[test]
 fn straight_tubes_lose_only_what_leaves_through_the_discs() {
     for resolution in [6, 16] {
-        let factors = bounce(TubeForm::Straight, resolution, Parts::STANDARD);
-        for (i, texel) in tube_texels(TubeForm::Straight, resolution)
-            .iter()
-            .enumerate()
-        {
+        let wall = TubeWall::new(TubeForm::Straight, resolution);
+        let factors = bounce(&wall, Parts::STANDARD);
+        for (i, texel) in wall.texels.iter().enumerate() {
             let walls: f64 = (0..factors.columns()).map(|j| factors[(i, j)]).sum();
             let discs: f64 = TubeForm::Straight
                 .openings()
@@ -69,38 +68,24 @@ fn straight_tubes_lose_only_what_leaves_through_the_discs() {
 #[test]
 fn bends_lose_only_what_rays_see_leaving() {
     const RAYS: u32 = 1 << 14;
-    let form = TubeForm::Bend;
-    let resolution = 6;
-    let factors = bounce(form, resolution, Parts::STANDARD);
-    let traced = ray_traced_tube_bounce(form, resolution, RAYS);
+    let wall = TubeWall::new(TubeForm::Bend, 6);
+    let factors = bounce(&wall, Parts::STANDARD);
+    let traced = ray_traced_tube_bounce(&wall, RAYS);
     for i in 0..factors.rows() {
         let sum = |m: &Matrix<f64>| (0..m.columns()).map(|j| m[(i, j)]).sum::<f64>();
-        // An area under a curve of a net of 2^14 points: some n^-3/4, 7e-4, and the parts' shadows.
+        // A net of n = 2^14 points errs by some n^-3/4, or 7e-4, in an area under a curve. The other part is the shadows of
+        // parts.
         let bound = 2e-3;
         assert!((sum(&factors) - sum(&traced)).abs() < bound, "{i}");
     }
 }
 
 #[test]
-fn rays_agree_with_the_quadrature() {
-    const RAYS: u32 = 4096;
-    for form in TubeForm::ALL {
-        let summed = bounce(form, 4, Parts { far: 8, near: 16 });
-        let traced = ray_traced_tube_bounce(form, 4, RAYS);
-        for (t, e) in traced.data().iter().zip(summed.data()) {
-            // As in `bounce_rays`: six standard errors, and a grain of one ray.
-            let bound = 6.0 * (e / f64::from(RAYS)).sqrt() + 1.0 / f64::from(RAYS);
-            assert!((t - e).abs() <= bound, "{form:?}: {t} against {e}");
-        }
-    }
-}
-
-#[test]
 fn transport_between_texels_is_reciprocal() {
     for form in TubeForm::ALL {
-        let resolution = 16;
-        let texels = tube_texels(form, resolution);
-        let factors = bounce(form, resolution, Parts::STANDARD);
+        let wall = TubeWall::new(form, 16);
+        let texels = &wall.texels;
+        let factors = bounce(&wall, Parts::STANDARD);
         let (mut difference, mut whole) = (0.0, 0.0);
         for j in 0..texels.len() {
             for i in 0..texels.len() {
@@ -112,8 +97,8 @@ fn transport_between_texels_is_reciprocal() {
                 whole += there * there;
             }
         }
-        // Exact for means over both texels; one is sampled at its centre, which costs the square of a
-        // texel's size, and more at the edges of shadows.
+        // Means over both texels would be exactly reciprocal. Receivers are sampled at their centres, which costs the
+        // square of a texel's size, and more at the edges of shadows.
         let error = (difference / whole).sqrt();
         assert!(error < 0.06, "{form:?}: {error}");
     }
@@ -122,15 +107,14 @@ fn transport_between_texels_is_reciprocal() {
 #[test]
 fn symmetry_fills_the_rows_that_direct_evaluation_gives() {
     for form in TubeForm::ALL {
-        let resolution = 5;
-        let texels = tube_texels(form, resolution);
+        let wall = TubeWall::new(form, 5);
         let parts = Parts { far: 3, near: 4 };
-        let factors = bounce(form, resolution, parts);
-        for (i, receiver) in texels.iter().enumerate() {
-            for (j, source) in texels.iter().enumerate() {
-                let near = is_near(form, resolution, &receiver.center, source);
+        let factors = bounce(&wall, parts);
+        for (i, receiver) in wall.texels.iter().enumerate() {
+            for (j, source) in wall.texels.iter().enumerate() {
+                let near = is_near(&wall, &receiver.center, source);
                 let parts = if near { parts.near } else { parts.far };
-                let direct: f64 = wall_points(form, resolution, source, parts)
+                let direct: f64 = wall_points(&wall, source, parts)
                     .map(|point| kernel(form, &receiver.center, &point))
                     .sum();
                 // A point may fall on the edge of a shadow, or a texel on the bound of what is near.
@@ -143,28 +127,13 @@ fn symmetry_fills_the_rows_that_direct_evaluation_gives() {
     }
 }
 
-#[test]
-fn fold_factors_are_those_of_the_tubes() {
-    let count = |form| tube_parity_classes(form, 4).class_count();
-    assert_eq!(TubeForm::ALL.map(count), [8, 4]);
-}
-
-#[test]
-fn texels_are_found_by_their_centers() {
-    for form in TubeForm::ALL {
-        for (k, texel) in tube_texels(form, 7).iter().enumerate() {
-            assert_eq!(tube_texel_at(form, 7, texel.center.position), k);
-        }
-    }
-}
-
-/// One bounce with the light itself under the integral, where F sees one value a texel.
-fn bounce_of_continuous_light(form: TubeForm, resolution: usize, parts: usize) -> Matrix<f64> {
-    let texels = tube_texels(form, resolution);
-    let fine = tube_texels(form, resolution * parts);
-    let light = smooth_light(form, resolution * parts);
+/// One bounce of the light itself, where F sees one value a texel: an integral over `parts`² parts of each texel.
+fn bounce_of_continuous_light(wall: &TubeWall, parts: usize) -> Matrix<f64> {
+    let (form, texels) = (wall.form, &wall.texels);
+    let fine = TubeWall::new(form, wall.resolution * parts);
+    let light = smooth_light(&fine);
     let value = |receiver: &TubeTexel| -> f64 {
-        let sources = fine.iter().zip(light.data());
+        let sources = fine.texels.iter().zip(light.data());
         let parts = sources.map(|(source, &light)| {
             let point = WallPoint {
                 position: source.center.position,
@@ -182,10 +151,11 @@ fn bounce_of_continuous_light(form: TubeForm, resolution: usize, parts: usize) -
 #[test]
 fn constant_texels_hold_smooth_light() {
     for form in TubeForm::ALL {
-        let light = smooth_light(form, 16);
-        let bounced = multiply(bounce(form, 16, Parts::STANDARD).view(), light.view());
-        let error = relative_error(&bounced, &bounce_of_continuous_light(form, 16, 6));
-        // Half of what one bounce may err by; at 32² texels a chart it is a quarter of this.
+        let wall = TubeWall::new(form, 16);
+        let light = smooth_light(&wall);
+        let bounced = multiply(bounce(&wall, Parts::STANDARD).view(), light.view());
+        let error = relative_error(&bounced, &bounce_of_continuous_light(&wall, 6));
+        // Half of what one bounce may err by. At 32² texels a chart the error is a quarter of this.
         assert!(error < 2.5e-3, "{form:?}: {error}");
     }
 }
@@ -193,8 +163,9 @@ fn constant_texels_hold_smooth_light() {
 #[test]
 fn one_bounce_of_smooth_light_is_as_good_as_with_finer_parts() {
     for form in TubeForm::ALL {
-        let light = smooth_light(form, 8);
-        let bounced = |parts| multiply(bounce(form, 8, parts).view(), light.view());
+        let wall = TubeWall::new(form, 8);
+        let light = smooth_light(&wall);
+        let bounced = |parts| multiply(bounce(&wall, parts).view(), light.view());
         let fine = bounced(Parts { far: 24, near: 64 });
         let error = relative_error(&bounced(Parts::STANDARD), &fine);
         assert!(error < 5e-4, "{form:?}: {error}");
@@ -207,10 +178,11 @@ fn one_bounce_of_smooth_light_is_as_good_as_with_finer_parts() {
 fn measure() {
     for form in TubeForm::ALL {
         for resolution in [8, 16, 32] {
-            let light = smooth_light(form, resolution);
+            let wall = TubeWall::new(form, resolution);
+            let light = smooth_light(&wall);
             let run = |parts| {
                 let start = std::time::Instant::now();
-                let out = multiply(bounce(form, resolution, parts).view(), light.view());
+                let out = multiply(bounce(&wall, parts).view(), light.view());
                 (out, start.elapsed().as_secs_f64())
             };
             let fine = Parts {
@@ -218,7 +190,7 @@ fn measure() {
                 near: 64,
             };
             let (reference, _) = run(fine);
-            let continuous = bounce_of_continuous_light(form, resolution, 128 / resolution);
+            let continuous = bounce_of_continuous_light(&wall, 128 / resolution);
             println!(
                 "{form:?} {resolution} far {fine:?} against continuous light: {:.2e}",
                 relative_error(&reference, &continuous)
