@@ -76,6 +76,9 @@ impl FrameReport {
     }
 }
 
+/// Skipped lights that a report has room for from the start; a frame that skips more allocates.
+const SKIPPED_ROOM: usize = 64;
+
 /// The data of a report.
 #[derive(Debug, Default)]
 pub(super) struct ReportData {
@@ -151,6 +154,7 @@ impl ReportSlot {
 
     fn empty(&self) -> ReportData {
         ReportData {
+            skipped: Vec::with_capacity(SKIPPED_ROOM),
             blocks: Vec::with_capacity(self.blocks),
             tiles: Vec::with_capacity(self.tiles),
             ..self.empty_without_room()
