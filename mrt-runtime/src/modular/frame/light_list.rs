@@ -57,6 +57,7 @@ struct Slot {
 }
 
 impl LightList {
+    /// No lights. Up to [`MAX_LIGHTS`] of them allocate nothing.
     pub(super) fn new() -> Self {
         // Room for all lights that may shine, so that a frame to which lights are added allocates nothing.
         Self {
