@@ -130,12 +130,16 @@ fn wall_slots(
 ) -> impl Iterator<Item = (usize, usize, Face)> + '_ {
     let layout = &scene.layout;
     let shape = scene.level.blocks[layout.order[rank.get()].get()].shape;
-    let texels: Vec<_> = shape.texels(scene.level.resolution).collect();
+    let resolution = scene.level.resolution;
     let slots = layout.slots(rank);
     let with_texels = slots.zip(&layout.texel_of_slot[layout.shape(rank)]);
     with_texels.filter_map(move |(slot, &texel)| {
-        let &(face, center) = texels.get(texel as usize)?;
-        (!shape.is_in_hole(face, center)).then_some((slot, texel as usize, face))
+        let texel = texel as usize;
+        let (wall, place) = (texel / resolution.pow(2), texel % resolution.pow(2));
+        let face = shape.walls().nth(wall)?;
+        // Only cubes have holes, so the centre is that of a flat wall.
+        let center = face.texel_center(resolution, place / resolution, place % resolution);
+        (!shape.is_in_hole(face, center)).then_some((slot, texel, face))
     })
 }
 
