@@ -8,7 +8,7 @@ pub mod light_prior;
 pub mod transport;
 pub mod paths;
 pub mod joint;
-mod shape_set;
+pub mod shape_set;
 pub mod lightfield;
 pub mod bake;
 pub mod bake_tubes;
