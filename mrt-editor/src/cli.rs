@@ -1,5 +1,6 @@
 //! The command line: one module a command, with its flags and what it does, below what commands share.
 
+mod hint;
 pub mod output;
 pub mod table;
 pub mod progress;

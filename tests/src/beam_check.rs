@@ -21,7 +21,7 @@ const OF_FACING: f32 = 1e-6;
 /// Tolerated difference of the angle from a spot's axis, radians.
 const ANGLE: f32 = 2e-6;
 
-/// A texel is on the edge of a shadow if its visibility flips when it moves by this share of its block's diagonal.
+/// Share of its block's diagonal by which a texel is moved. If its visibility flips, it is on the edge of a shadow.
 const EDGE: f64 = 1e-5;
 
 /// Positions and normals of a block's texels, by slot.

@@ -44,7 +44,7 @@ impl Flux {
         self.sum(&by_texel(&self.scene, signal), |_| [1.0; 3])
     }
 
-    /// The part of it that the walls reflect.
+    /// The light that the walls reflect.
     pub fn reflected(&self, signal: &[f32]) -> [f64; 3] {
         let albedo = |texel: usize| self.albedo[texel].map(f64::from);
         self.sum(&by_texel(&self.scene, signal), albedo)

@@ -52,7 +52,7 @@ pub fn furnish(random: &mut Random, level: &mut Level) {
     assert_eq!(level.check(), Ok(()));
 }
 
-/// Puts doors into this share of the connections: closed, open and half open ones.
+/// Puts closed, open and partly open doors into a share of the connections.
 pub fn add_doors(random: &mut Random, level: &mut Level, share: f64) {
     for connection in 0..level.connections.len() {
         if random.unit() < share {

@@ -4,6 +4,7 @@ mod pictures;
 
 use crate::accuracy::exact_level::{ExactLevelError, LevelErrors, measure};
 use crate::cli::dictionary_source::{SourceError, load};
+use crate::cli::hint::after_assembly;
 use crate::cli::output::{OutIsFile, ReportError, check_out_folder, print_report};
 use crate::cli::table::Table;
 use crate::document::built_in::MAZE;
@@ -72,7 +73,7 @@ pub enum DemoError {
     #[error("the built-in maze: {0}")]
     Maze(#[from] LevelTextError),
     /// Level and dictionary do not fit.
-    #[error(transparent)]
+    #[error("{0}{hint}", hint = after_assembly(.0))]
     Assemble(#[from] AssembleError),
     /// A light does not shine.
     #[error(transparent)]

@@ -2,6 +2,7 @@
 
 use crate::cli::dictionary_report::{CouplingArg, KindBytes, StorageArg, kind_bytes};
 use crate::cli::dictionary_source::{DictionaryBytes, SourceError};
+use crate::cli::hint::after_assembly;
 use crate::cli::output::{ReportError, is_same_place, print_report};
 use crate::cli::table::Table;
 use crate::document::level_file::{LevelFileError, read_level};
@@ -63,7 +64,7 @@ pub enum PackError {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// The dictionary lacks something that the level uses.
-    #[error(transparent)]
+    #[error("{0}{hint}", hint = after_assembly(.0))]
     Assemble(#[from] AssembleError),
     /// The packed dictionary has no form as bytes.
     #[error(transparent)]

@@ -48,9 +48,9 @@ use std::num::NonZero;
 /// The light of a scene, frame by frame.
 ///
 /// A frame keeps its [`Scene`], and owns all that changes while a game runs: lights, doors, albedo and emission of
-/// walls, and the buffers of every stage. Solving allocates nothing, with three exceptions: the caller's
-/// [`Executor`](crate::executor::Executor) may allocate, so does a frame whose previous [`FrameReport`] still exists,
-/// and so does a list of skipped lights that is longer than all before.
+/// walls, and the buffers of every stage. Setting lights and solving allocate nothing, with three exceptions: the
+/// caller's [`Executor`](crate::executor::Executor) may allocate, and so does a frame whose previous [`FrameReport`]
+/// still exists, or that gets more lights than [`MAX_LIGHTS`](crate::light::limits::MAX_LIGHTS).
 ///
 /// Signals are copied out block by block in the level's order, in a block channel by channel (red, green, blue), in a
 /// channel texel by texel in the order of the canonical shape ([`Shape::texels`](crate::level::shape::Shape::texels)).

@@ -59,7 +59,17 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 
 /// True for a path below a folder of the checkout.
 fn is_path(text: &str) -> bool {
-    let starts = ["mrt-", "tests/", "docs/", "assets/", "benches/", ".ci/"];
+    let starts = [
+        "mrt-core/",
+        "mrt-runtime/",
+        "mrt-dictionary/",
+        "mrt-editor/",
+        "tests/",
+        "docs/",
+        "assets/",
+        "benches/",
+        ".ci/",
+    ];
     text.contains('/')
         && starts.iter().any(|start| text.starts_with(start))
         && text

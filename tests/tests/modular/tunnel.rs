@@ -252,7 +252,7 @@ fn a_white_furnace_stays_white_in_a_long_tunnel() {
 }
 
 #[test]
-fn each_bounce_adds_no_more_energy_than_the_one_before() {
+fn energy_never_grows() {
     let mut level = tunnel(&TUNNEL);
     for block in &mut level.blocks {
         block.albedo = [Vec3::ONE; 6];

@@ -17,7 +17,7 @@ fn mobile() -> &'static Dictionary {
     DICTIONARY.get_or_init(|| baked("mobile", "cubes-3d", |_| ()))
 }
 
-/// The level with nothing left out of far light: where two parts of it have the same size, either could be left out.
+/// The level, with nothing left out of far light. Of two parts of the same size, either could be left out.
 fn assembled(level: &Level, coupling: Coupling) -> Scene {
     let config = AssembleConfig {
         // As deep as the table, so that lightfields do not stand in for it.

@@ -217,7 +217,7 @@ fn single_texels_that_are_far_apart_are_reciprocal() {
 }
 
 #[test]
-fn the_largest_radiosity_never_grows() {
+fn energy_never_grows() {
     let scene = ExactScene::from_cells(&L_SHAPE, 6).unwrap();
     let transport = Transport::build(&scene);
     let mut radiosity: Vec<f64> = (0..scene.texel_count())

@@ -57,7 +57,7 @@ fn level(recipe: &Recipe, random: &mut Random) -> Level {
     let mut level = floor_plan(&random_cells(random, recipe.cells), 0.0);
     for block in &mut level.blocks {
         for albedo in &mut block.albedo {
-            // Many third powers are near 0, so that many walls are nearly as bright as the brightest, and some are dark.
+            // The third power is often near 0. So many walls are nearly as bright as the brightest, and some are dark.
             let mut value = || (1.0 - random.unit().powi(3)) as f32 * recipe.largest_albedo;
             *albedo = Vec3::new(value(), value(), value());
         }
@@ -81,8 +81,8 @@ fn lights(recipe: &Recipe, level: &Level, random: &mut Random) -> Vec<Light> {
         .collect()
 }
 
-/// A bounce may carry this much more flux than the walls reflected and emitted. Frames scale down what is more than 5 %, up
-/// to rounding.
+/// Largest excess of the flux of a bounce over the flux that the walls reflected and emitted, relative. Frames scale down any
+/// excess above 5 %, up to rounding.
 const GAIN: f64 = 0.0501;
 
 fn is_sound(irradiance: &[f32]) -> bool {

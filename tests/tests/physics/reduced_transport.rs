@@ -37,8 +37,8 @@ fn furnace(cells: &[[i32; 2]], albedo: f32, bounces: Bounces) -> Deviation {
 /// Bound of the largest deviation.
 ///
 /// Measured: 0.08 % where the table has all paths, and 0.51 % in the corridor of twelve, where light beyond eight openings is
-/// left out. In the room of 5x5 cells 2.0 %: many of its paths are longer than the table's. Lightfields stand in for those,
-/// and divide light between paths in a slightly different way.
+/// left out. In the room of 5x5 cells 2.0 %: many of its paths are longer than the table's. Lightfields stand in for
+/// them, and divide light between paths in a slightly different way.
 fn furnace_largest(cells: &[[i32; 2]]) -> f64 {
     if cells.len() == 25 { 0.025 } else { 0.01 }
 }

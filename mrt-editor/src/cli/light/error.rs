@@ -1,6 +1,7 @@
 //! Why `mrt light` stops.
 
 use crate::cli::dictionary_source::SourceError;
+use crate::cli::hint::after_assembly;
 use crate::cli::import_args::import_hint;
 use crate::cli::output::ReportError;
 use crate::document::level_file::LevelFileError;
@@ -49,7 +50,7 @@ pub enum LightCommandError {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// Level and dictionary do not fit.
-    #[error(transparent)]
+    #[error("{0}{hint}", hint = after_assembly(.0))]
     Assemble(#[from] AssembleError),
     /// A light is refused.
     #[error(transparent)]

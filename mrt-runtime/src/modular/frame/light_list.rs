@@ -34,7 +34,7 @@ pub struct SkippedLight {
 }
 
 /// The lights of a frame in slots, which ids name, and those that may shine in places.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct LightList {
     slots: Vec<Slot>,
     /// Slots without a light; the last one is used first.
@@ -57,10 +57,15 @@ struct Slot {
 }
 
 impl LightList {
+    /// No lights. Up to [`MAX_LIGHTS`] of them allocate nothing.
     pub(super) fn new() -> Self {
+        // Room for all lights that may shine, so that a frame to which lights are added allocates nothing.
         Self {
+            slots: Vec::with_capacity(MAX_LIGHTS),
+            free_slots: Vec::with_capacity(MAX_LIGHTS),
             placed: Vec::with_capacity(MAX_LIGHTS),
-            ..Self::default()
+            free_places: Vec::with_capacity(MAX_LIGHTS),
+            skipped: 0,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The report of a frame.
 
 use crate::level::block_index::BlockIndex;
+use crate::light::limits::MAX_LIGHTS;
 use crate::modular::frame::light_list::SkippedLight;
 #[cfg(feature = "timing")]
 use crate::modular::frame::stage_clock::StageTimes;
@@ -151,6 +152,7 @@ impl ReportSlot {
 
     fn empty(&self) -> ReportData {
         ReportData {
+            skipped: Vec::with_capacity(MAX_LIGHTS),
             blocks: Vec::with_capacity(self.blocks),
             tiles: Vec::with_capacity(self.tiles),
             ..self.empty_without_room()

@@ -486,8 +486,8 @@ fn beams_may_exceed_their_room_and_fit_again() {
     }
 }
 
-/// A block with a small shape becomes dark with its lamp, although its light is within the tolerance, and whatever larger
-/// shapes the same task computed before.
+/// A block with a small shape becomes dark with its lamp, although its light is within the tolerance, and although the same
+/// task has just computed larger shapes.
 #[test]
 fn faint_light_of_small_shapes_goes_out() {
     let cells = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [9, 0, 0]];

@@ -12,8 +12,8 @@ use mrt_tests::{
 };
 use std::ops::Range;
 
-/// A bounce may carry this much more flux than left the walls as direct light. Frames scale down what is more than
-/// `SPOT_GAIN`, up to rounding.
+/// Largest excess of the flux of a bounce over the flux that left the walls, relative to direct light. Frames scale down any
+/// excess above `SPOT_GAIN`, up to rounding.
 const GAIN: f64 = 0.0501;
 
 /// Tolerance for rounding of `f32` sums over a block, relative.
@@ -35,8 +35,8 @@ fn unkind_lights(random: &mut Random, level: &Level, scene: &Scene) -> Vec<Light
     lights
 }
 
-/// Solves once more, and checks that all numbers are finite, that irradiance is not negative, and that no bounce carries more
-/// flux than left the walls.
+/// Solves once more. Checks that all numbers are finite, that irradiance is not negative, and that no bounce carries more flux
+/// than left the walls.
 fn check_solve(frame: &mut Frame, flux: &Flux, lights: &[Light], bounces: Bounces, case: &str) {
     let before = frame.indirect();
     frame.light_with(lights, bounces);

@@ -363,7 +363,7 @@ fn missing_variants_shapes_and_sources_are_named() {
         shape: "dead_end",
         transport: "rebuilt",
     };
-    assert!(expected.to_string().contains("mrt adapt"));
+    assert!(expected.to_string().contains("adapted to this level"));
     assert_eq!(error, expected);
     // A variant for another warp or transport does not do.
     let other = with_transport(&corridor(&[3.0, 3.0]), WarpTransport::Rebuilt);

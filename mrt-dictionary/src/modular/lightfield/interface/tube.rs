@@ -21,7 +21,7 @@ use mrt_core::linalg::parity_modes::ParityBasis;
 
 /// A way through a tube, from one of its openings to the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Passage {
+pub struct TubePassage {
     /// The tube.
     pub form: TubeForm,
     /// Where light enters.
@@ -30,21 +30,21 @@ pub struct Passage {
     pub exit: Face,
 }
 
-impl Passage {
+impl TubePassage {
     /// Straight on.
-    pub const STRAIGHT: Passage = Passage {
+    pub const STRAIGHT: TubePassage = TubePassage {
         form: TubeForm::Straight,
         entry: Face::NegX,
         exit: Face::PosX,
     };
     /// Through a bend, to the left of the heading with +y up.
-    pub const LEFT: Passage = Passage {
+    pub const LEFT: TubePassage = TubePassage {
         form: TubeForm::Bend,
         entry: Face::PosX,
         exit: Face::PosZ,
     };
     /// To the right: the same bend from its other end.
-    pub const RIGHT: Passage = Passage {
+    pub const RIGHT: TubePassage = TubePassage {
         form: TubeForm::Bend,
         entry: Face::PosZ,
         exit: Face::PosX,
@@ -104,7 +104,7 @@ pub fn tube_emitted_lightfield(
 pub fn tube_propagated(
     grid: &LightfieldGrid,
     entering: &Matrix<f64>,
-    passage: Passage,
+    passage: TubePassage,
 ) -> Matrix<f64> {
     propagated(grid, entering, |uv, toward| passage.trace_back(uv, toward))
 }
@@ -126,7 +126,10 @@ pub fn tube_enriched_basis(
     let mut sent = Vec::with_capacity(2);
     // What goes right is the mirror image of what goes left, and in each parity the same up to its sign. So the one
     // stands for both.
-    for (passage, share) in [(Passage::STRAIGHT, 1.0), (Passage::LEFT, 2f64.sqrt())] {
+    for (passage, share) in [
+        (TubePassage::STRAIGHT, 1.0),
+        (TubePassage::LEFT, 2f64.sqrt()),
+    ] {
         sent.push(scaled(&tube_propagated(grid, &own, passage), share));
         progress.check()?;
     }
@@ -167,8 +170,8 @@ pub fn tube_interface(
         let sent = tube_propagated(grid, &basis.vectors, passage);
         Ok(lightfield_coefficients(basis, &sent))
     };
-    let straight = through(Passage::STRAIGHT)?;
-    let left = through(Passage::LEFT)?;
+    let straight = through(TubePassage::STRAIGHT)?;
+    let left = through(TubePassage::LEFT)?;
     // The mirror of u changes the sign of odd modes and exchanges left and right.
     let sign = |mode: usize| {
         if basis.parity[mode] & 1 == 1 {

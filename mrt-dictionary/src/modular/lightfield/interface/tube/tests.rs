@@ -61,7 +61,7 @@ struct Source {
 /// no lightfield grid anywhere.
 fn traced_response(
     source: &Source,
-    chain: &[Passage],
+    chain: &[TubePassage],
     receiver: &TubeWall,
     entry: Face,
 ) -> Vec<f64> {
@@ -129,7 +129,7 @@ fn positions_on_the_disc_round_trip_and_weigh_its_flux() {
 }
 
 #[test]
-fn four_rolls_are_none_and_a_roll_takes_left_to_up() {
+fn four_quarter_turns_change_nothing_and_one_takes_left_to_up() {
     let grid = grid();
     let field = Matrix::from_fn(grid.sample_count(), 1, |sample, _| {
         let position = grid.position(sample / grid.direction_count());
@@ -179,7 +179,7 @@ fn isotropic_light_lights_the_walls_by_the_disc_they_see() {
 fn passages_gain_no_flux_and_light_that_fills_a_tube_stays_isotropic() {
     let grid = grid();
     let entering = isotropic(&grid);
-    for passage in [Passage::STRAIGHT, Passage::LEFT, Passage::RIGHT] {
+    for passage in [TubePassage::STRAIGHT, TubePassage::LEFT, TubePassage::RIGHT] {
         let sent = tube_propagated(&grid, &entering, passage);
         assert!(sent.frobenius_norm() < entering.frobenius_norm());
         // Walls of unit radiosity fill what the entry leaves dark: together unit radiance.
@@ -197,9 +197,12 @@ fn right_is_the_mirror_of_left() {
     let field = Matrix::from_fn(grid.sample_count(), 1, |sample, _| {
         grid.root_weight(sample) * f64::from((sample % 97) as u32)
     });
-    let left = tube_propagated(&grid, &field, Passage::LEFT);
+    let left = tube_propagated(&grid, &field, TubePassage::LEFT);
     let entering = mirrored(&grid, &field);
-    let right = mirrored(&grid, &tube_propagated(&grid, &entering, Passage::RIGHT));
+    let right = mirrored(
+        &grid,
+        &tube_propagated(&grid, &entering, TubePassage::RIGHT),
+    );
     let difference: f64 = left
         .data()
         .iter()
@@ -214,7 +217,7 @@ fn right_is_the_mirror_of_left() {
 /// Error of the chain of section 5.1 without reduction (source, passages, response) against rays.
 fn chain_error(
     grid: &LightfieldGrid,
-    chain: &[Passage],
+    chain: &[TubePassage],
     (receiver, entry): (TubeForm, Face),
 ) -> f64 {
     let wall = TubeWall::new(TubeForm::Bend, 8);
@@ -242,9 +245,13 @@ fn the_chain_reaches_what_rays_reach() {
     for (chain, receiver, bound) in [
         (vec![], straight, 0.02),
         (vec![], bend, 0.02),
-        (vec![Passage::STRAIGHT], bend, 0.05),
-        (vec![Passage::LEFT], straight, 0.05),
-        (vec![Passage::STRAIGHT, Passage::RIGHT], straight, 0.1),
+        (vec![TubePassage::STRAIGHT], bend, 0.05),
+        (vec![TubePassage::LEFT], straight, 0.05),
+        (
+            vec![TubePassage::STRAIGHT, TubePassage::RIGHT],
+            straight,
+            0.1,
+        ),
     ] {
         let error = chain_error(&grid, &chain, receiver);
         println!("{chain:?} {receiver:?}: {error:.4}");
