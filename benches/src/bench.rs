@@ -1,6 +1,6 @@
-//! `mrt-bench`: run time against error, for the frame in many settings and for other ways to the same light.
+//! `mrt-bench`: run time against error, for the frame in many settings and for other methods that give the same light.
 //!
-//! Every way is timed in turns with what it is compared with, and its light is compared with exact radiosity. The
+//! Methods that are compared take turns while they are timed, and the light of each is compared with exact radiosity. The
 //! modules follow the flow: what is asked for, what is measured, how, and what is written.
 
 mod args;
@@ -107,7 +107,7 @@ fn measure_mazes(
     let mut records = Vec::new();
     for &count in mazes {
         let maze = LitMaze::new(count, args.lights.map(usize::from));
-        // Ways without a dictionary depend on its resolution alone.
+        // Methods without a dictionary depend on the resolution alone.
         let mut baselines: BTreeMap<usize, (Baseline, ExactLight)> = BTreeMap::new();
         for named in dictionaries.iter() {
             step += 1;

@@ -30,7 +30,7 @@ use voxels::{FreeSpace, VoxelGrid, Winding, find_free_space};
 /// Points spread over the mesh to measure albedos and coverage.
 const SURFACE_POINTS: usize = 100_000;
 
-/// Voxels that the free space is first looked for with, to learn the rooms' height.
+/// Voxels of a first, coarse search for free space, which tells the rooms' height.
 const FIRST_VOXELS: f64 = 4e5;
 
 /// More voxels than this are not made; cells then have fewer voxels across.

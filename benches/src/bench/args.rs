@@ -124,7 +124,7 @@ impl BenchArgs {
         }
     }
 
-    /// Time for each way to light a maze.
+    /// Time for each method.
     pub(super) fn budget(&self) -> Duration {
         Duration::from_millis(if self.quick { 150 } else { 1000 })
     }

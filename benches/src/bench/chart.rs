@@ -227,7 +227,7 @@ fn join(marks: &mut Vec<Mark>, mut points: Vec<[f32; 2]>, colour: Colour, width:
 /// What a point's colour does not tell; at the start of one of several sweeps, also its resolution.
 fn short_name(record: &Record, sweep: Option<&[&Record]>) -> String {
     let name = match record.method {
-        "mrt" => record.way().replace('/', " "),
+        "mrt" => record.method_case().replace('/', " "),
         "paper" => record.preset.clone(),
         "dense" => format!("{0}x{0}", record.resolution),
         "svd" => format!("rank {}", record.size),

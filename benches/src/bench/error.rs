@@ -38,7 +38,7 @@ pub enum BenchError {
 }
 
 impl BenchError {
-    /// The same, with an interrupt as [`BenchError::Cancelled`] wherever it came from.
+    /// Makes [`BenchError::Cancelled`] of an interrupt, wherever it came from.
     pub(super) fn with_interrupts_on_top(self) -> Self {
         match self {
             BenchError::Measure(

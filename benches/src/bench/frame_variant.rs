@@ -41,7 +41,7 @@ impl Packing {
     }
 }
 
-/// One way to compute a frame.
+/// Settings of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameVariant<'a> {
     /// Name of the dictionary.

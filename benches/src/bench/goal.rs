@@ -58,7 +58,7 @@ impl Goal {
         }
     }
 
-    /// The same with more said about it.
+    /// Adds a remark.
     pub fn with_remark(self, remark: &str) -> Self {
         let detail = format!("{}; {remark}", self.detail);
         Self { detail, ..self }

@@ -158,7 +158,7 @@ impl Goals<'_, '_> {
         Ok(())
     }
 
-    /// Mobile against standard, with all instructions that there are.
+    /// Mobile against standard, with all instructions that the machine has.
     fn mobile(&mut self, presets: Presets) -> Result<(), MeasureError> {
         self.next_step(&format!("{}, mobile", self.maze))?;
         let mobile = fastest("mobile", presets.mobile);
@@ -300,11 +300,12 @@ impl Goals<'_, '_> {
         let times = in_turns(&mut subjects, self.bench.budget, self.bench.progress)?;
         let [one, two, alone, shared] = [0, 1, 2, 3].map(|k| &times[k]);
         let most = significant(alone.median(&[0]) / shared.median(&[0]));
-        let stages: [(fn(&Times) -> Timing<'_>, &str); 2] =
-            [(indirect, "indirect"), (whole, "frame")];
-        for (of, what) in stages {
+        for (what, alone, shared) in [
+            ("indirect", indirect(one), indirect(two)),
+            ("frame", whole(one), whole(two)),
+        ] {
             let figure = format!("{name}, {what}: one thread / two threads");
-            let goal = Goal::ratio(&figure, Limit::AtLeast(1.7), of(one), of(two));
+            let goal = Goal::ratio(&figure, Limit::AtLeast(1.7), alone, shared);
             self.found
                 .push(goal.with_remark(&format!("sums in registers {most}")));
         }

@@ -122,7 +122,7 @@ impl LitMaze {
         }
     }
 
-    /// The lights once more, for other ways to light the maze.
+    /// The lights once more, for other methods.
     pub fn lamps(&self) -> Vec<MazeLamp> {
         let lamp = |light: &Light| match *light {
             Light::Sphere {

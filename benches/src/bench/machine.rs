@@ -70,7 +70,7 @@ pub struct Shared(ThreadPool);
 const PARTS: usize = 16;
 
 impl Shared {
-    /// With a number of threads.
+    /// Starts a number of threads.
     ///
     /// # Errors
     /// If the system gives no threads.
@@ -135,7 +135,7 @@ impl Kernel for FusedSums {
     }
 }
 
-/// BufferSum of a buffer.
+/// The sum of a buffer.
 struct BufferSum<'a>(&'a [f32]);
 
 impl Kernel for BufferSum<'_> {

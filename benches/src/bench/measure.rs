@@ -1,4 +1,4 @@
-//! All ways to light one level with one dictionary, and those that need none.
+//! Measures all methods on one level: those that use a dictionary, and those that need none.
 
 use super::dense::{Dense, MAX_TEXELS, Product};
 use super::exact_light::{ExactLight, ExactLightError};
@@ -20,7 +20,8 @@ use mrt_runtime::Coupling;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Above this number of blocks, ways are measured one after the other: their scenes would not fit into memory together.
+/// Above this number of blocks, methods are measured one after the other: their scenes would not fit into memory
+/// together.
 const TOGETHER_BLOCKS: usize = 2000;
 
 /// Kept singular values.
@@ -32,14 +33,15 @@ const VIRTUAL_LIGHTS: [usize; 6] = [4, 16, 64, 256, 1024, 4096];
 /// Rays of a texel.
 const RAYS: [usize; 6] = [1, 4, 16, 64, 256, 1024];
 
-/// Rays or virtual lights for each light from which on noise moves the sum of all light by less than [`FLUX_TOLERANCE`].
+/// With this number of rays or virtual lights for each light, and with more, noise moves the sum of all light by less than
+/// [`FLUX_TOLERANCE`].
 const FLUX_SAMPLES: usize = 64;
 
 /// What all measurements share.
 pub struct Bench<'a> {
     /// Limits of the machine.
     pub machine: &'a Machine,
-    /// Time for each way.
+    /// Time for each method.
     pub budget: Duration,
     /// Longest time for one sample of a ray method.
     pub ray_limit: Duration,
@@ -51,7 +53,7 @@ pub struct Bench<'a> {
     pub progress: &'a Progress<'a>,
 }
 
-/// Direct light and the paper's time, which ways without a dictionary are compared with.
+/// Direct light and the paper's time, which methods without a dictionary are compared with.
 pub struct Baseline {
     frame: TimedFrame,
     direct_seconds: f64,
@@ -68,8 +70,8 @@ pub struct Reduced {
     pub baseline: Option<Baseline>,
 }
 
-/// A way to light a level.
-struct Way<'a> {
+/// A method, and what records call the case.
+struct MethodCase<'a> {
     method: &'static str,
     /// The part of the case after the level.
     name: String,
@@ -195,7 +197,7 @@ impl Bench<'_> {
             peak: self.machine.peak(variant.simd, variant.threads),
             bandwidth: self.machine.bandwidth(touched as usize),
         };
-        let way = Way {
+        let method_case = MethodCase {
             method: "mrt",
             name: variant.name(),
             preset: variant.preset,
@@ -216,7 +218,7 @@ impl Bench<'_> {
             size: frame.modes(),
             bytes: frame.resident_bytes(),
             bytes_touched: touched as usize,
-            ..empty_record(maze, way, frame.resolution())
+            ..empty_record(maze, method_case, frame.resolution())
         }
     }
 
@@ -229,7 +231,7 @@ impl Bench<'_> {
     ) -> Record {
         let bytes = paper.bytes();
         let ms = 1e3 * times.median(&paper::ALL_STAGES);
-        let way = Way {
+        let method_case = MethodCase {
             method: "paper",
             name: format!("{}/paper/t1", variant.preset),
             preset: variant.preset,
@@ -251,7 +253,7 @@ impl Bench<'_> {
                 &paper.costs(),
                 self.one_core_limits(bytes),
             ),
-            ..empty_record(maze, way, variant.dictionary.resolution)
+            ..empty_record(maze, method_case, variant.dictionary.resolution)
         }
     }
 
@@ -284,13 +286,13 @@ impl Bench<'_> {
         let mut records = Vec::new();
         for ((product, times), size) in products.iter().zip(&times).zip(sizes) {
             let resolution = baseline.frame.resolution();
-            let way = match size == texels {
-                true => Way {
+            let method_case = match size == texels {
+                true => MethodCase {
                     method: "dense",
                     name: format!("r{resolution}/dense/t1"),
                     preset: &baseline.preset,
                 },
-                false => Way {
+                false => MethodCase {
                     method: "svd",
                     name: format!("r{resolution}/svd{size}/t1"),
                     preset: &baseline.preset,
@@ -300,7 +302,7 @@ impl Bench<'_> {
                 size,
                 ms_from_lights: 1e3 * (times.median(&[0]) + baseline.direct_seconds),
                 paper_dense_ms: baseline.paper_ms,
-                ..self.product_record(product, times, empty_record(maze, way, resolution))
+                ..self.product_record(product, times, empty_record(maze, method_case, resolution))
             };
             let light = dense.irradiance(product.light(), &exact.texels);
             records.push(with_error(record, exact, &light)?);
@@ -390,7 +392,7 @@ impl Bench<'_> {
             let runs = [(); 2].map(|()| (sweep.trace)(scene, points, count));
             last = start.elapsed();
             let ms = 1e3 * runs.iter().map(seconds).fold(f64::INFINITY, f64::min);
-            let way = Way {
+            let method_case = MethodCase {
                 method: sweep.method,
                 name: format!("r{resolution}/{}{count}/t1", sweep.method),
                 preset: &baseline.preset,
@@ -404,7 +406,7 @@ impl Bench<'_> {
                 paper_dense_ms: baseline.paper_ms,
                 bytes: scene.bytes(),
                 bytes_touched: scene.bytes(),
-                ..empty_record(maze, way, resolution)
+                ..empty_record(maze, method_case, resolution)
             };
             let light = &runs[0].irradiance;
             let is_noisy = count < FLUX_SAMPLES * maze.lights.len();
@@ -437,14 +439,14 @@ pub fn timed_frame(maze: &LitMaze, variant: &FrameVariant) -> Result<TimedFrame,
 }
 
 /// A record without measurements, of one thread with the best instructions.
-fn empty_record(maze: &LitMaze, way: Way, resolution: usize) -> Record {
+fn empty_record(maze: &LitMaze, method_case: MethodCase, resolution: usize) -> Record {
     Record {
-        case: format!("{}/{}", maze.name, way.name),
+        case: format!("{}/{}", maze.name, method_case.name),
         level: maze.name.clone(),
         blocks: maze.level.blocks.len(),
         lights: maze.lights.len(),
-        method: way.method,
-        preset: way.preset.to_owned(),
+        method: method_case.method,
+        preset: method_case.preset.to_owned(),
         resolution,
         size: 0,
         storage: "f32",
@@ -465,7 +467,7 @@ fn empty_record(maze: &LitMaze, way: Way, resolution: usize) -> Record {
     }
 }
 
-/// What the machine can do at most for a way.
+/// What the machine can do at most for a method.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     /// Operations a second in units of 1e9.

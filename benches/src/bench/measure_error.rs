@@ -40,7 +40,7 @@ pub enum MeasureError {
     /// The system gives no threads to compare with.
     #[error("no threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A way gives another light than the level's.
+    /// A method gives another light than the level's.
     #[error(
         "{case}: indirect light is {found:.3} times the exact one in all; expected within {FLUX_TOLERANCE} of 1"
     )]

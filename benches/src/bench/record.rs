@@ -23,10 +23,10 @@ pub struct StageRecord {
     pub bandwidth_share: f64,
 }
 
-/// One way to light one level.
+/// A level lit by a method.
 #[derive(Clone, Debug, Serialize)]
 pub struct Record {
-    /// The level and the way to light it, such as "maze41/standard/avx2/t1".
+    /// The level, the method and its settings, such as "maze41/standard/avx2/t1".
     pub case: String,
     /// Name of the level.
     pub level: String,
@@ -77,8 +77,8 @@ pub struct Record {
 
 impl Record {
     /// The part of the case after the level.
-    pub fn way(&self) -> &str {
-        self.case.split_once('/').map_or("", |(_, way)| way)
+    pub fn method_case(&self) -> &str {
+        self.case.split_once('/').map_or("", |(_, case)| case)
     }
 }
 

@@ -142,12 +142,12 @@ impl TimedFrame {
         })
     }
 
-    /// The same with another motion.
+    /// Sets what happens between frames.
     pub fn with_motion(self, motion: Motion) -> Self {
         Self { motion, ..self }
     }
 
-    /// The same with a [`FrameConfig::tolerance`] of this share of the brightest indirect irradiance.
+    /// Sets [`FrameConfig::tolerance`] to a share of the brightest indirect irradiance, and solves a first frame.
     ///
     /// # Errors
     /// [`TimedFrameError::Skipped`].

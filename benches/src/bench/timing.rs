@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 /// Work that is timed stage by stage.
 pub trait Timed {
-    /// Does the work once; returns the seconds of each stage, of which there are always as many.
+    /// Does the work once; returns the seconds of each stage. The number of stages never changes.
     fn run(&mut self) -> Vec<f64>;
 }
 

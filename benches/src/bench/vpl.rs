@@ -20,7 +20,7 @@ struct VirtualLight {
     flux: Vec3,
 }
 
-/// Irradiance at points of walls from `count` virtual lights, as many of each lamp and at least one.
+/// Irradiance at points of walls from `count` virtual lights: the same number for each lamp, at least one.
 pub fn trace(scene: &RayScene, receivers: &[RayPoint], count: usize) -> Traced {
     let start = Instant::now();
     let per_light = (count / scene.lamps().len()).max(1);

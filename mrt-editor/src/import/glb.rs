@@ -104,8 +104,9 @@ fn parse_document(json: &[u8]) -> Result<gltf::Document, String> {
             remove(node, &["skin"]);
         }
     }
-    let root: gltf::json::Root =
-        gltf::json::deserialize::from_value(json).map_err(|error| format!("document: {error}"))?;
+    // Reading from text again compiles in a third of the time that reading from a value takes.
+    let root = gltf::json::Root::from_slice(json.to_string().as_bytes())
+        .map_err(|error| format!("document: {error}"))?;
     gltf::Document::from_json(root).map_err(|error| format!("document: {error}"))
 }
 

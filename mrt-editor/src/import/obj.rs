@@ -1,9 +1,8 @@
 //! Wavefront OBJ and MTL, through tobj: positions, faces and diffuse colours, nothing else.
 //!
-//! tobj gets the lines that matter one by one. So its errors, which name no place, get the number of the
-//! line that it had read; texture coordinates and normals, over whose absence it can panic, stay out; and so
-//! do materials of the faces, whose names it drops when their library is missing and which we need for
-//! made-up colours.
+//! tobj gets the lines that matter one by one. So its errors, which name no place, get the number of the line that it had
+//! read. It sees no texture coordinates and normals, over whose absence it can panic, and no materials of faces: it drops
+//! their names when the library is missing, and colours are made up from those names.
 
 use super::error::ImportError;
 use super::file::read_library;
@@ -77,7 +76,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
 struct ObjLines<'a> {
     path: &'a Path,
     lines: std::str::Lines<'a>,
-    /// What is left of the current line, backwards.
+    /// Bytes of the current line that tobj has not read yet, last first.
     pending: Vec<u8>,
     /// Number of the line handed out last, from 1.
     number: usize,

@@ -1,20 +1,19 @@
-//! `mrt-figures` as a user meets it: what needs no reference files is drawn anywhere, and what needs them
-//! says so.
+//! `mrt-figures`: the pages' figures that need no reference files are drawn anywhere, the others say what they
+//! need.
 
+use crate::common::{folder, json_lines, run, text};
 use mrt_dictionary::config::BakeConfig;
 use mrt_dictionary::modular::bake::bake;
 use mrt_dictionary::progress::Progress;
-use serde_json::Value;
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 use tempfile::TempDir;
 
-/// Pictures of the pages must stay small: they are kept in the repository.
+/// Figures are kept in the repository, so they must stay small.
 const MOST_BYTES: usize = 200_000;
 
-/// A dictionary that takes a second to bake, in `folder`.
-fn write_small_dictionary(folder: &Path) {
+/// A folder with `small.mrt`, a dictionary that takes a second to bake.
+fn folder_with_dictionary() -> TempDir {
     let mut config = BakeConfig::preset("mobile").expect("a preset");
     config.preset = "small".to_owned();
     config.resolution = 4;
@@ -25,36 +24,30 @@ fn write_small_dictionary(folder: &Path) {
     config.check().expect("legal settings");
     let dictionary = bake(&config, &Progress::silent()).expect("nobody cancels");
     let bytes = dictionary.to_bytes().expect("it has a form as bytes");
-    fs::write(folder.join("small.mrt"), bytes).expect("there is room");
+    let folder = folder();
+    fs::write(folder.path().join("small.mrt"), bytes).expect("there is room");
+    folder
 }
 
-/// Runs the program in `folder`, where no reference files are.
-fn figures(folder: &TempDir, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_mrt-figures"))
-        .args(["--dictionary", "small.mrt", "--resolution", "4"])
-        .args(arguments)
-        .current_dir(folder.path())
-        .env("MRT_SHARED", folder.path())
-        .output()
-        .expect("the program starts")
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).expect("output is text")
+/// Draws with the small dictionary; no reference files are there.
+fn figures(folder: &TempDir, more: &[&str]) -> Output {
+    let mut arguments = vec!["--dictionary", "small.mrt", "--resolution", "4"];
+    arguments.extend(more);
+    run(env!("CARGO_BIN_EXE_mrt-figures"), folder, &arguments)
 }
 
 #[test]
-fn figures_are_drawn_again_to_the_same_bytes_and_the_one_without_references_is_left_out() {
-    let folder = tempfile::tempdir().expect("there is room for temporary files");
-    write_small_dictionary(folder.path());
+fn figures_are_the_same_bytes_each_time_and_one_is_left_out_without_references() {
+    let folder = folder_with_dictionary();
     let output = figures(&folder, &["--out", "a", "--json"]);
     let errors = text(&output.stderr);
-    assert!(output.status.success(), "{errors}");
     assert!(
         errors.contains("hops is left out: the reference files are absent"),
         "{errors}"
     );
-    let report: Value = serde_json::from_str(&text(&output.stdout)).expect("one JSON object");
+    let [report] = &json_lines(&output)[..] else {
+        panic!("one JSON object: {}", text(&output.stdout));
+    };
     let drawn = report["figures"].as_array().expect("a list of figures");
     let names: Vec<&str> = drawn.iter().filter_map(|f| f["figure"].as_str()).collect();
     assert_eq!(names, ["basis", "spectra", "warps", "white-face", "probes"]);
@@ -72,19 +65,16 @@ fn figures_are_drawn_again_to_the_same_bytes_and_the_one_without_references_is_l
 
 #[test]
 fn a_figure_asked_for_by_name_must_be_drawn() {
-    let folder = tempfile::tempdir().expect("there is room for temporary files");
-    write_small_dictionary(folder.path());
+    let folder = folder_with_dictionary();
     let output = figures(&folder, &["--only", "hops,basis"]);
     assert_eq!(output.status.code(), Some(1));
     let errors = text(&output.stderr);
-    assert!(
-        errors.contains("hops: the reference files are absent"),
-        "{errors}"
-    );
-    assert!(
-        errors.contains("1 of 2 figures could not be drawn"),
-        "{errors}"
-    );
+    for part in [
+        "hops: the reference files are absent",
+        "1 of 2 figures could not be drawn",
+    ] {
+        assert!(errors.contains(part), "{errors}");
+    }
     // The other one is there all the same.
     assert!(folder.path().join("docs/pictures/basis.png").is_file());
     assert!(!folder.path().join("docs/pictures/hops.png").exists());

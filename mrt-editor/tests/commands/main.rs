@@ -1,0 +1,12 @@
+//! The `mrt` program as a user meets it: exit codes, messages, and files that are whole or not there.
+
+mod accuracy;
+mod adapt;
+mod bake;
+mod common;
+mod demo;
+mod info;
+mod light;
+mod map;
+mod pack;
+mod usage;
