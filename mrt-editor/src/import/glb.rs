@@ -53,6 +53,13 @@ fn read_mesh(bytes: &[u8]) -> Result<RawMesh, Fault> {
     }
     let glb = gltf::binary::Glb::from_slice(bytes).map_err(|_| header())?;
     let document = parse_document(&glb.json).map_err(|error| Fault::at(error, "valid glTF 2.0"))?;
+    let asset = &document.as_json().asset;
+    let needed = asset.min_version.as_ref().unwrap_or(&asset.version);
+    // Every 2.x promises to read as 2.0 does, unless it names a later least version.
+    if needed.split('.').next() != Some("2") {
+        let place = format!("asset: version {needed}");
+        return Err(Fault::at(place, "glTF 2"));
+    }
     let mut reader = Reader {
         bin: glb.bin.as_deref().unwrap_or_default(),
         mesh: RawMesh::default(),
@@ -103,11 +110,36 @@ fn parse_document(json: &[u8]) -> Result<gltf::Document, String> {
         for node in list_mut(root.get_mut("nodes")) {
             remove(node, &["skin"]);
         }
+        check_position_accessors(root)?;
     }
     // Reading from text again compiles in a third of the time that reading from a value takes.
     let root = gltf::json::Root::from_slice(json.to_string().as_bytes())
         .map_err(|error| format!("document: {error}"))?;
     gltf::Document::from_json(root).map_err(|error| format!("document: {error}"))
+}
+
+/// The library's own check of a primitive takes its positions' accessor without asking whether
+/// there is one.
+fn check_position_accessors(
+    root: &serde_json::Map<String, serde_json::Value>,
+) -> Result<(), String> {
+    let accessor_count = list(root.get("accessors")).count() as u64;
+    for (mesh_index, mesh) in list(root.get("meshes")).enumerate() {
+        for (index, primitive) in list(mesh.get("primitives")).enumerate() {
+            let accessor = primitive["attributes"]["POSITION"].as_u64();
+            if let Some(accessor) = accessor.filter(|&accessor| accessor >= accessor_count) {
+                return Err(format!(
+                    "document: meshes[{mesh_index}].primitives[{index}]: accessor {accessor} of \
+                     {accessor_count}"
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn list(value: Option<&serde_json::Value>) -> impl Iterator<Item = &serde_json::Value> {
+    value.and_then(|v| v.as_array()).into_iter().flatten()
 }
 
 fn list_mut(value: Option<&mut serde_json::Value>) -> impl Iterator<Item = &mut serde_json::Value> {
@@ -271,7 +303,8 @@ mod tests {
             "nodes":[{"translation":[0,0,5],"children":[1]},{"mesh":0,"scale":[2,2,2]}],
             "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"material":0}]}],
             "materials":[{"pbrMetallicRoughness":{"baseColorFactor":[0.2,0.4,0.6,1]}}],
-            "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"},
+            "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3",
+             "min":[0,0,0],"max":[1,1,0]},
             {"bufferView":0,"byteOffset":36,"componentType":5121,"count":3,"type":"SCALAR"}],
             "bufferViews":[{"buffer":0,"byteLength":40}],"buffers":[{"byteLength":40}]}"#
             .to_owned();
@@ -303,24 +336,32 @@ mod tests {
     #[test]
     fn every_index_and_offset_is_checked() {
         for (from, to, place) in [
-            (r#""nodes":[0]"#, r#""nodes":[7]"#, "node 7"),
+            (r#""nodes":[0]"#, r#""nodes":[7]"#, "scenes[0].nodes[0]"),
             (r#""children":[1]"#, r#""children":[0]"#, "node 0"),
-            (r#""mesh":0"#, r#""mesh":9"#, "mesh 9"),
-            (r#""POSITION":0"#, r#""POSITION":9"#, "accessor 9"),
+            (r#""mesh":0"#, r#""mesh":9"#, "nodes[1].mesh"),
+            (r#""POSITION":0"#, r#""POSITION":9"#, "accessor 9 of 2"),
             (r#""indices":1"#, r#""indices":0"#, "accessor 0"),
-            (r#""material":0"#, r#""material":5"#, "material 5"),
+            (
+                r#""material":0"#,
+                r#""material":5"#,
+                "primitives[0].material",
+            ),
             (r#""count":3"#, r#""count":0"#, "accessor 0"),
             (r#""count":3"#, r#""count":4"#, "accessor 0"),
             (r#""byteOffset":36"#, r#""byteOffset":38"#, "accessor 1"),
-            (r#""byteOffset":36"#, r#""byteOffset":1"#, "index"),
+            (r#""byteOffset":36"#, r#""byteOffset":14"#, "index 128"),
             (r#""byteLength":40"#, r#""byteLength":41"#, "accessor 0"),
-            (r#""buffer":0"#, r#""buffer":1"#, "accessor 0"),
+            (r#""buffer":0"#, r#""buffer":1"#, "bufferViews[0].buffer"),
             (
                 r#"[{"byteLength":40}]"#,
                 r#"[{"uri":"a.bin"}]"#,
                 "accessor 0",
             ),
-            (r#""version":"2.0""#, r#""version":"1.0""#, "asset"),
+            (
+                r#""version":"2.0""#,
+                r#""version":"1.0""#,
+                "asset: version 1.0",
+            ),
             (r#""scenes""#, r#""other""#, "scenes"),
             (
                 r#""scenes""#,
