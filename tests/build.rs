@@ -5,7 +5,6 @@
 //! still absent; `tests/run` sets `MRT_SHARED` where it finds one.
 
 #[path = "../mrt-core/src/reference/oracle_file/folder.rs"]
-#[allow(dead_code, reason = "`oracle_folder` is for the tests")]
 mod folder;
 
 const FOLDERS: [&str; 5] = [

@@ -5,21 +5,11 @@ use super::plot::{Axis, Plot, Scale, Stroke, draw_legend};
 use super::source::FigureSource;
 use crate::canvas::{Anchor, Area, Canvas, Colour, Lettering, SERIES, TextStyle};
 use mrt_core::reference::error_measure::HOP_GROUPS;
-use mrt_core::reference::oracle_file::{ReferenceFile, oracle_folder, read};
+use mrt_core::reference::oracle_file::{ReferenceFile, WHITE_LEVELS, oracle_folder, read};
 use mrt_editor::accuracy::reference_file::{CompareConfig, LightAccuracy, compare};
 use mrt_editor::cli::dictionary_source::load;
 use mrt_runtime::{Coupling, Dictionary};
 use std::borrow::Cow;
-
-/// Irradiance files whose levels every set of shapes can build.
-const REFERENCES: [&str; 6] = [
-    "cube",
-    "corridor5",
-    "l_turn",
-    "t_junction",
-    "room3x3",
-    "maze11",
-];
 
 /// Errors of exact transport between texels of the files' own resolution, %, as the description of the files states them:
 /// noise of the files and of the texel grid, least and most of any file.
@@ -80,7 +70,7 @@ pub(super) fn draw(source: &FigureSource) -> Result<Canvas, FigureError> {
 fn references() -> Result<Vec<ReferenceFile>, FigureError> {
     let folder = oracle_folder().ok_or(FigureError::NoReferences)?;
     let read = |name: &&str| Ok(read(&folder.join(format!("{name}.json")))?);
-    REFERENCES.iter().map(read).collect()
+    WHITE_LEVELS.iter().map(read).collect()
 }
 
 /// The errors of the references themselves: x, and y from and to.

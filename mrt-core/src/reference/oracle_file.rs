@@ -12,7 +12,24 @@ mod description;
 mod parse;
 mod folder;
 
+use std::path::PathBuf;
+
 pub use error::ReferenceError;
-pub use folder::{ground_truth_folder, oracle_folder};
+pub use folder::ground_truth_folder;
 pub use parse::read;
 pub use reference_file::{Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceFile};
+
+/// Reference files of white walls and flat levels, which every set of shapes can build.
+pub const WHITE_LEVELS: [&str; 6] = [
+    "cube",
+    "corridor5",
+    "l_turn",
+    "t_junction",
+    "room3x3",
+    "maze11",
+];
+
+/// The folder of reference files, `oracle`, if it exists; see [`ground_truth_folder`].
+pub fn oracle_folder() -> Option<PathBuf> {
+    ground_truth_folder("oracle")
+}

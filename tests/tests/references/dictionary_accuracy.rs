@@ -5,7 +5,7 @@ use mrt_core::lighting::sphere_light::sphere_light_irradiance;
 use mrt_core::linalg::matrix::{Matrix, multiply};
 use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::error_measure::{HOP_GROUPS, rel_l2, rel_l2_by_hop};
-use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile};
+use mrt_core::reference::oracle_file::{Kind, RGB_BOUNCES, ReferenceFile, WHITE_LEVELS};
 use mrt_dictionary::config::PriorConfig;
 use mrt_dictionary::modular::light_prior::basis::light_prior;
 use mrt_dictionary::modular::light_prior::cube::direct_samples;
@@ -19,16 +19,6 @@ use mrt_runtime::{
 };
 use mrt_tests::{CONVERGED, baked, configured, default_dictionary, reference, refusal, solved};
 use std::sync::OnceLock;
-
-/// Reference levels of white walls.
-const WHITE: [&str; 6] = [
-    "cube",
-    "corridor5",
-    "l_turn",
-    "t_junction",
-    "room3x3",
-    "maze11",
-];
 
 /// Our indirect irradiance and the reference's, in the reference's order of texels and channels.
 struct Pair {
@@ -149,7 +139,7 @@ fn preset(name: &str) -> &'static Dictionary {
 /// more openings from the light.
 fn first_bounce_errors(dictionary: &Dictionary, coupling: Coupling) -> [f64; 1 + HOP_GROUPS] {
     let mut groups: [Vec<f64>; 1 + HOP_GROUPS] = Default::default();
-    for name in WHITE {
+    for name in WHITE_LEVELS {
         let reference = reference(name);
         let pairs = solve_all(
             &reference,
@@ -236,7 +226,7 @@ fn tables_of_paths_err_no_more_than_lightfields() {
 
 /// Mean error of all bounces, over all lights of the white levels.
 fn all_bounces_error(dictionary: &Dictionary, albedo: f64) -> f64 {
-    let error = mean(WHITE.iter().flat_map(|name| {
+    let error = mean(WHITE_LEVELS.iter().flat_map(|name| {
         let reference = reference(name);
         solve_all(
             &reference,

@@ -4,11 +4,6 @@
 
 use std::path::{Path, PathBuf};
 
-/// The folder of reference files, `oracle`, if it exists; see [`ground_truth_folder`].
-pub fn oracle_folder() -> Option<PathBuf> {
-    ground_truth_folder("oracle")
-}
-
 /// A folder of ground truth, if it exists.
 ///
 /// It is `name` in the folder that the environment variable `MRT_SHARED` names. If that is not set, it
