@@ -96,7 +96,7 @@ fn tidy(
     let found = raw.triangles.len();
     let paints = raw.paints.iter();
     let mut untidy = TriangleMesh {
-        positions: std::mem::take(&mut raw.positions),
+        positions: raw.positions.iter().map(|p| p.as_vec3()).collect(),
         triangles: std::mem::take(&mut raw.triangles),
         normals: None,
         triangle_materials: std::mem::take(&mut raw.triangle_materials),

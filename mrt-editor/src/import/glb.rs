@@ -210,7 +210,7 @@ impl Reader<'_> {
             let position = Vec3::new(number(0), number(4), number(8));
             self.mesh
                 .positions
-                .push(world_from_node.transform_point3(position));
+                .push(world_from_node.transform_point3(position).as_dvec3());
         }
         let indices: Vec<u32> = match primitive.indices() {
             None => (0..vertex_count as u32).collect(),
@@ -325,7 +325,7 @@ mod tests {
     fn triangles_stand_where_their_nodes_put_them() {
         let mesh = read_mesh(&glb(&[])).expect("reads");
         let corners = [[0.0, 0.0, 5.0], [2.0, 0.0, 5.0], [0.0, 2.0, 5.0]];
-        assert_eq!(mesh.positions, corners.map(Vec3::from_array));
+        assert_eq!(mesh.positions, corners.map(glam::DVec3::from_array));
         assert_eq!(mesh.triangles, [[0, 1, 2]]);
         assert_eq!(mesh.paints[0].colour, Some(Vec3::new(0.2, 0.4, 0.6)));
         let mean = r#"{"extras":{"meanBaseColorLinear":[0.1,0.2,0.3]},"pbrMetallicRoughness":{"#;

@@ -63,7 +63,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<RawMesh, ImportError> {
         let first = mesh.positions.len() as u32;
         let positions = model.mesh.positions.as_chunks::<3>().0;
         mesh.positions
-            .extend(positions.iter().map(|&p| Vec3::from_array(p)));
+            .extend(positions.iter().map(|&p| Vec3::from_array(p).as_dvec3()));
         let triangles = model.mesh.indices.as_chunks::<3>().0;
         mesh.triangles
             .extend(triangles.iter().map(|t| t.map(|k| first + k)));
