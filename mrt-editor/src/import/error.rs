@@ -53,14 +53,39 @@ pub enum ImportError {
     },
     /// Scaled coordinates exceed [`MAX_COORDINATE_M`].
     #[error(
-        "scene {}: scaled coordinates up to {found} m; expected at most {MAX_COORDINATE_M} m",
+        "scene {}: found coordinates up to {found:e} m in a mesh of {size:e} m; expected at most {MAX_COORDINATE_M:e} m",
         path.display()
     )]
     OutOfRange {
         /// Which file.
         path: PathBuf,
         /// Largest coordinate, metres.
-        found: f32,
+        found: f64,
+        /// Longest side of the mesh, metres.
+        size: f64,
+    },
+    /// No material has a name that was asked for.
+    #[error("scene {}: no material is named `{found}`; expected one of {expected}", path.display())]
+    NoSuchMaterial {
+        /// Which file.
+        path: PathBuf,
+        /// The name or pattern.
+        found: String,
+        /// Names of the mesh's materials.
+        expected: String,
+    },
+    /// Every triangle has a material that is left out.
+    #[error(
+        "scene {}: all {found} triangles have materials that are left out: {names}; expected at least one that is read",
+        path.display()
+    )]
+    AllLeftOut {
+        /// Which file.
+        path: PathBuf,
+        /// Triangles in the file.
+        found: usize,
+        /// Names of the materials.
+        names: String,
     },
     /// The scale is not a positive number.
     #[error("scale {found}; expected a positive number of metres per unit")]

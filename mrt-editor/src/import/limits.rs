@@ -7,8 +7,17 @@ pub const MAX_FILE_BYTES: u64 = 1 << 30;
 pub const MAX_LIBRARY_BYTES: u64 = 16 << 20;
 
 /// Larger coordinates, in metres, are refused: squared distances have to stay finite.
-pub const MAX_COORDINATE_M: f32 = 1e9;
+pub const MAX_COORDINATE_M: f64 = 1e9;
 
-/// Albedos of files are moved into this range: a wall of albedo 0 never shows a bounce, and between walls of albedo 1
+/// Mean albedos of walls are moved into this range: a wall of albedo 0 never shows a bounce, and between walls of albedo 1
 /// light never dies out.
 pub const ALBEDO_RANGE: [f32; 2] = [0.05, 0.9];
+
+/// Images with a longer side, in texels, are not read.
+pub const MAX_IMAGE_SIDE: u32 = 16_384;
+
+/// Images that need more memory to decode are not read.
+pub const MAX_IMAGE_BYTES: u64 = 512 << 20;
+
+/// Albedo of what states no colour.
+pub const UNSTATED_ALBEDO: f32 = 0.53;

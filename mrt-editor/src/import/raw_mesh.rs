@@ -1,8 +1,6 @@
 //! A mesh as a file has it, before faulty triangles are taken out.
 
-use super::limits::ALBEDO_RANGE;
 use glam::{DVec3, Vec2, Vec3};
-use mrt_core::geometry::mesh::Material;
 use std::collections::BTreeMap;
 
 /// A mesh as the file has it; all indices are in range.
@@ -107,61 +105,7 @@ impl Paint {
     pub(super) fn unnamed() -> Self {
         Self::new(UNNAMED, None)
     }
-
-    /// True if the file states a colour outside [`ALBEDO_RANGE`].
-    pub(super) fn is_clamped(&self) -> bool {
-        self.colour
-            .is_some_and(|colour| colour != clamp_albedo(colour))
-    }
-
-    /// The material with `albedo`, if that is given, or with the file's colour, or with one made up from its name.
-    pub(super) fn material(&self, albedo: Option<f32>) -> Material {
-        let albedo = match (albedo, self.colour) {
-            (Some(albedo), _) => Vec3::splat(albedo),
-            (None, Some(colour)) => clamp_albedo(colour),
-            (None, None) => colour_of_name(&self.name),
-        };
-        Material {
-            name: self.name.clone(),
-            albedo,
-        }
-    }
-}
-
-fn clamp_albedo(colour: Vec3) -> Vec3 {
-    let [low, high] = ALBEDO_RANGE;
-    colour.clamp(Vec3::splat(low), Vec3::splat(high))
 }
 
 /// Name of the material of triangles that name none.
 const UNNAMED: &str = "unnamed";
-
-/// A colour of low saturation, each channel between 0.47 and 0.59, by FNV-1a, which gives the same on every machine
-/// and with every compiler. [`UNNAMED`] stays grey.
-fn colour_of_name(name: &str) -> Vec3 {
-    if name == UNNAMED {
-        return Vec3::splat(0.53);
-    }
-    let hash = |seed: u32| {
-        let hash = name.bytes().fold(0x811c_9dc5 ^ seed, |hash: u32, byte| {
-            (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193)
-        });
-        (hash >> 8) as f32 / (1u32 << 24) as f32
-    };
-    Vec3::new(hash(1), hash(2), hash(3)) * 0.12 + 0.47
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn albedos_stay_away_from_zero_and_one() {
-        let paint = Paint::new("red", Some(Vec3::X));
-        assert!(paint.is_clamped());
-        assert_eq!(paint.material(None).albedo, Vec3::new(0.9, 0.05, 0.05));
-        let made_up = Paint::new("brick", None).material(None).albedo;
-        assert!(made_up.min_element() >= 0.47 && made_up.max_element() <= 0.59);
-        assert_eq!(paint.material(Some(0.3)).albedo, Vec3::splat(0.3));
-    }
-}

@@ -1,0 +1,265 @@
+//! What colour a mesh has at each point: base colours times vertex colours times images.
+
+use super::limits::{ALBEDO_RANGE, UNSTATED_ALBEDO};
+use super::raw_mesh::{Paint, PaintImage, RawImage, RawMesh, Wrap};
+use super::texture::{Texture, longest_side};
+use glam::{Vec2, Vec3};
+use mrt_core::geometry::mesh::{Kept, TriangleMesh};
+
+/// The colours of a mesh at each of its points. Made for one mesh, and of no use with another.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceColours {
+    /// Factor at each vertex, linear RGB; empty if there is none.
+    vertex_colours: Vec<Vec3>,
+    /// Corners of each triangle in its image; empty if there are none.
+    corner_uvs: Vec<[Vec2; 3]>,
+    /// By material.
+    paints: Vec<SurfacePaint>,
+    textures: Vec<Texture>,
+    /// Into which mean albedos of walls are moved.
+    albedo_range: [f32; 2],
+}
+
+/// What covers a material's triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct SurfacePaint {
+    colour: Vec3,
+    /// Index into the textures, and what stands beyond its edges.
+    texture: Option<(usize, [Wrap; 2])>,
+    emission: Vec3,
+}
+
+/// A point of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfacePoint {
+    /// Which triangle.
+    pub triangle: usize,
+    /// Weights of its second and third corner.
+    pub barycentric: Vec2,
+    /// The area around it over which colours are averaged, square metres.
+    pub area: f32,
+}
+
+/// What was made up because the file does not state it, or cannot be read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct MadeUp {
+    /// Materials without a colour.
+    pub(super) colours: usize,
+    /// Images that were read.
+    pub(super) images: usize,
+    /// A sentence for each image that cannot be read.
+    pub(super) warnings: Vec<String>,
+}
+
+impl SurfaceColours {
+    fn colourless() -> Self {
+        Self {
+            vertex_colours: Vec::new(),
+            corner_uvs: Vec::new(),
+            paints: Vec::new(),
+            textures: Vec::new(),
+            albedo_range: ALBEDO_RANGE,
+        }
+    }
+
+    /// One albedo for everything, which the user set, and the file's emission.
+    pub(super) fn uniform(albedo: f32, paints: &[Paint]) -> Self {
+        let paint = |paint: &Paint| SurfacePaint {
+            colour: Vec3::splat(albedo),
+            texture: None,
+            emission: finite_emission(paint),
+        };
+        Self {
+            paints: paints.iter().map(paint).collect(),
+            albedo_range: [0.0, 1.0],
+            ..Self::colourless()
+        }
+    }
+
+    /// The albedos of a mesh's materials, without emission.
+    pub fn of_materials(mesh: &TriangleMesh) -> Self {
+        let paint = |albedo| SurfacePaint {
+            colour: albedo,
+            ..SurfacePaint::default()
+        };
+        let albedos = mesh.materials.iter().map(|material| material.albedo);
+        Self {
+            paints: albedos.map(paint).collect(),
+            ..Self::colourless()
+        }
+    }
+
+    /// The colours of what was `kept` of a file's mesh. Reads the images that it uses.
+    pub(super) fn new(raw: &RawMesh, mesh: &TriangleMesh, kept: &Kept) -> (Self, MadeUp) {
+        let mut made_up = MadeUp::default();
+        let mut colours = Self::colourless();
+        if !raw.colours.is_empty() {
+            let colour = |&v: &u32| raw.colours[v as usize];
+            colours.vertex_colours = kept.vertices.iter().map(colour).collect();
+        }
+        let is_used = used(mesh, raw.paints.len());
+        let texture_of_image = colours.read_images(raw, &is_used, &mut made_up);
+        if !colours.textures.is_empty() {
+            let uvs = |&t: &u32| raw.corner_uvs.get(t as usize).copied();
+            let uvs = kept.triangles.iter().map(|t| uvs(t).unwrap_or_default());
+            colours.corner_uvs = uvs.collect();
+        }
+        let is_coloured = colours.materials_with_vertex_colours(mesh, raw.paints.len());
+        for (k, paint) in raw.paints.iter().enumerate() {
+            let texture = paint.image.and_then(|PaintImage { image, wrap }| {
+                texture_of_image
+                    .get(image)
+                    .copied()
+                    .flatten()
+                    .map(|texture| (texture, wrap))
+            });
+            let is_image_missing = paint.image.is_some() && texture.is_none();
+            let is_stated = paint.colour.is_some() || texture.is_some() || is_coloured[k];
+            if is_used[k] && !is_stated {
+                made_up.colours += 1;
+            }
+            let unread = if is_stated && !is_image_missing {
+                1.0
+            } else {
+                UNSTATED_ALBEDO
+            };
+            colours.paints.push(SurfacePaint {
+                colour: paint.colour.unwrap_or(Vec3::ONE) * unread,
+                texture,
+                emission: if is_used[k] {
+                    finite_emission(paint)
+                } else {
+                    Vec3::ZERO
+                },
+            });
+        }
+        (colours, made_up)
+    }
+
+    /// Reads the images of used paints; gives the index of the texture of each image that could be read.
+    fn read_images(
+        &mut self,
+        raw: &RawMesh,
+        is_used: &[bool],
+        made_up: &mut MadeUp,
+    ) -> Vec<Option<usize>> {
+        let mut user_of_image: Vec<Option<&Paint>> = vec![None; raw.images.len()];
+        for (paint, _) in raw.paints.iter().zip(is_used).filter(|&(_, &used)| used) {
+            if let Some(used) = paint.image
+                && let Some(user) = user_of_image.get_mut(used.image)
+            {
+                user.get_or_insert(paint);
+            }
+        }
+        let longest = longest_side(user_of_image.iter().flatten().count());
+        let mut read = |(image, user): (&RawImage, Option<&Paint>)| match Texture::decode(
+            &image.bytes,
+            longest,
+        ) {
+            Ok(texture) => {
+                self.textures.push(texture);
+                made_up.images += 1;
+                Some(self.textures.len() - 1)
+            }
+            Err(reason) => {
+                made_up.warnings.push(format!(
+                        "material `{}`: image `{}` cannot be read ({reason}); expected a sound PNG, JPEG or \
+                         WebP. It counts as grey",
+                        user?.name, image.name
+                    ));
+                None
+            }
+        };
+        let images = raw.images.iter().zip(user_of_image);
+        images
+            .map(|(image, user)| user.and_then(|user| read((image, Some(user)))))
+            .collect()
+    }
+
+    /// Materials of which a vertex has another colour than white, which readers give to vertices without one.
+    fn materials_with_vertex_colours(&self, mesh: &TriangleMesh, count: usize) -> Vec<bool> {
+        let mut found = vec![false; count];
+        if self.vertex_colours.is_empty() {
+            return found;
+        }
+        for (vertices, &material) in mesh.triangles.iter().zip(&mesh.triangle_materials) {
+            let is_white = |&v: &u32| self.vertex_colours[v as usize] == Vec3::ONE;
+            found[material as usize] |= !vertices.iter().all(is_white);
+        }
+        found
+    }
+
+    /// The range into which mean albedos of walls are moved: [`ALBEDO_RANGE`], or everything from 0 to 1 where the user set
+    /// the albedo.
+    pub fn albedo_range(&self) -> [f32; 2] {
+        self.albedo_range
+    }
+
+    /// Gives a mesh's materials their base colours.
+    pub(super) fn paint_materials(&self, mesh: &mut TriangleMesh) {
+        for (material, paint) in mesh.materials.iter_mut().zip(&self.paints) {
+            material.albedo = limited(paint.colour);
+        }
+    }
+
+    /// Diffuse reflectance around a point, linear RGB, each in [0, 1].
+    ///
+    /// # Panics
+    /// If the triangle does not exist, or the mesh is another than that of the colours.
+    pub fn albedo(&self, mesh: &TriangleMesh, at: &SurfacePoint) -> Vec3 {
+        let paint = self.paints[mesh.triangle_materials[at.triangle] as usize];
+        let mut colour = paint.colour;
+        if !self.vertex_colours.is_empty() {
+            let corners = mesh.triangles[at.triangle].map(|v| self.vertex_colours[v as usize]);
+            colour *= interpolated(corners, at.barycentric);
+        }
+        if let Some((texture, wrap)) = paint.texture {
+            let uvs = self.corner_uvs[at.triangle];
+            let [a, b, c] = mesh.corners(at.triangle);
+            let area = (b - a).cross(c - a).length();
+            let uv_area = (uvs[1] - uvs[0]).perp_dot(uvs[2] - uvs[0]).abs();
+            let [p, q, r] = uvs;
+            let place = p + (q - p) * at.barycentric.x + (r - p) * at.barycentric.y;
+            colour *= self.textures[texture].sample(place, wrap, at.area * uv_area / area);
+        }
+        limited(colour)
+    }
+
+    /// Radiance that a triangle sends out to all sides of its front, linear RGB, W/(m² sr).
+    ///
+    /// # Panics
+    /// As [`SurfaceColours::albedo`].
+    pub fn emission(&self, mesh: &TriangleMesh, triangle: usize) -> Vec3 {
+        self.paints[mesh.triangle_materials[triangle] as usize].emission
+    }
+}
+
+/// Which materials triangles use.
+pub(super) fn used(mesh: &TriangleMesh, count: usize) -> Vec<bool> {
+    let mut is_used = vec![false; count];
+    for &material in &mesh.triangle_materials {
+        is_used[material as usize] = true;
+    }
+    is_used
+}
+
+/// An albedo that conserves energy, and grey for one that is no number.
+fn limited(colour: Vec3) -> Vec3 {
+    if colour.is_finite() {
+        colour.clamp(Vec3::ZERO, Vec3::ONE)
+    } else {
+        Vec3::splat(UNSTATED_ALBEDO)
+    }
+}
+
+fn finite_emission(paint: &Paint) -> Vec3 {
+    if paint.emission.is_finite() {
+        paint.emission.max(Vec3::ZERO)
+    } else {
+        Vec3::ZERO
+    }
+}
+
+fn interpolated([a, b, c]: [Vec3; 3], at: Vec2) -> Vec3 {
+    a + (b - a) * at.x + (c - a) * at.y
+}
