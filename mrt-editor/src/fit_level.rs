@@ -26,7 +26,7 @@ use mrt_runtime::Level;
 use mrt_runtime::LevelError;
 use mrt_runtime::blocks::{SHAPES, Shape};
 use mrt_runtime::low_level::output::receiver::ReceiverMap;
-use paint::{PaintReport, PaintedMesh, coverage, paint_level};
+use paint::{PaintReport, PaintedMesh, coverage, distances, paint_level};
 use voxels::{FreeSpace, VoxelGrid, Winding, find_free_space};
 
 /// Points spread over the mesh to measure albedos and coverage.
@@ -93,8 +93,10 @@ pub fn map_mesh(painted: PaintedMesh<'_>, config: &MapConfig) -> Result<Mapped, 
         }
     }
     let receivers = ReceiverMap::new(&mapped.level);
-    mapped.coverage = coverage(&mapped.level, &receivers, &points);
-    mapped.paint = paint_level(&mut mapped.level, painted, &receivers, &points);
+    let distances = distances(&mapped.level, &receivers, &points);
+    mapped.coverage = coverage(&points, &distances);
+    let level = &mut mapped.level;
+    mapped.paint = paint_level(level, painted, &receivers, &points, &distances);
     mapped.level.check()?;
     Ok(mapped)
 }

@@ -2,8 +2,9 @@
 //!
 //! Faulty triangles are left out and counted, so that everything after works on clean geometry.
 
-pub mod error;
 pub mod limits;
+pub mod error;
+pub mod config;
 mod file;
 mod raw_mesh;
 mod glb;
@@ -16,6 +17,7 @@ mod origin;
 mod lamps;
 pub mod report;
 
+use config::ImportConfig;
 use error::ImportError;
 use file::read_file;
 use glam::{DAffine3, DVec3, Vec3};
@@ -28,26 +30,6 @@ use raw_mesh::RawMesh;
 use report::ImportReport;
 use std::path::Path;
 use surface_colours::{MadeUp, SurfaceColours};
-
-/// How to read a scene.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ImportConfig {
-    /// Metres per unit of the file.
-    pub scale: f64,
-    /// Which axis of the file points up.
-    pub up: UpAxis,
-    /// Albedo for everything, instead of the file's colours.
-    pub albedo: Option<f32>,
-    /// Materials whose triangles are left out, by name; `*` stands for any text.
-    pub skip_materials: Vec<String>,
-    /// If not empty, only triangles of these materials are read.
-    pub only_materials: Vec<String>,
-    /// Whether triangles are read whose materials are named like helper faces of level editors.
-    pub keeps_tool_materials: bool,
-    /// Point of the scaled and turned mesh, metres, that becomes the origin; by default the mesh's own, or whole metres
-    /// near its centre if that is so far away that `f32` would round positions visibly.
-    pub origin: Option<DVec3>,
-}
 
 /// A mesh in metres with +Y up.
 #[derive(Clone, Debug)]
@@ -64,38 +46,13 @@ pub struct ImportedScene {
     pub report: ImportReport,
 }
 
-impl Default for ImportConfig {
-    fn default() -> Self {
-        Self {
-            scale: 1.0,
-            up: UpAxis::Y,
-            albedo: None,
-            skip_materials: Vec::new(),
-            only_materials: Vec::new(),
-            keeps_tool_materials: false,
-            origin: None,
-        }
-    }
-}
-
 /// Reads an OBJ or GLB file, by how its name ends.
 ///
 /// # Errors
 /// [`ImportError`]; faulty triangles are no error as long as one is good.
 pub fn read_scene(path: &Path, config: &ImportConfig) -> Result<ImportedScene, ImportError> {
-    check(config)?;
+    config.check()?;
     tidy(path, read_raw(path)?, config)
-}
-
-fn check(config: &ImportConfig) -> Result<(), ImportError> {
-    let found = config.scale;
-    if !(found.is_finite() && found > 0.0) {
-        return Err(ImportError::Scale { found });
-    }
-    match config.albedo {
-        Some(found) if !(0.0..=1.0).contains(&found) => Err(ImportError::Albedo { found }),
-        _ => Ok(()),
-    }
 }
 
 fn read_raw(path: &Path) -> Result<RawMesh, ImportError> {
@@ -264,5 +221,42 @@ mod tests {
         ));
         let missing = read_scene(Path::new("/nowhere/a.obj"), &ImportConfig::default());
         assert!(matches!(missing, Err(ImportError::Io { .. })));
+    }
+
+    #[test]
+    fn a_far_mesh_is_moved_in_f64_with_its_lamps() {
+        let raw = |x: f64| RawMesh {
+            positions: [[0.0, 0.0], [0.1, 0.0], [0.0, 0.3]]
+                .map(|[dx, y]| DVec3::new(x + dx, y, 0.0))
+                .to_vec(),
+            triangles: vec![[0, 1, 2]],
+            triangle_materials: vec![0],
+            paints: vec![raw_mesh::Paint::unnamed()],
+            lamps: vec![raw_mesh::RawLamp {
+                kind: raw_mesh::LampKind::Point,
+                position: DVec3::new(x, 0.25, 0.0),
+                direction: DVec3::NEG_Y,
+                intensity: Vec3::ONE,
+            }],
+            ..RawMesh::default()
+        };
+        let tidied = |x: f64, origin: Option<DVec3>| {
+            let config = ImportConfig {
+                origin,
+                ..ImportConfig::default()
+            };
+            tidy(Path::new("a.obj"), raw(x), &config).expect("a mesh")
+        };
+        let far = tidied(1e7, None);
+        assert_eq!(far.reading.origin, DVec3::X * 1e7);
+        assert_eq!(far.report.origin_m, [1e7, 0.0, 0.0]);
+        let near = tidied(0.0, None);
+        assert_eq!(near.reading.origin, DVec3::ZERO);
+        // At 1e7, f64 has steps of 2e-9.
+        let pairs = far.mesh.positions.iter().zip(&near.mesh.positions);
+        assert!(pairs.into_iter().all(|(a, b)| a.distance(*b) < 1e-8));
+        assert_eq!(far.lights, near.lights);
+        // Whoever lights the mesh reads it as the level says.
+        assert_eq!(tidied(1e7, Some(far.reading.origin)).mesh, far.mesh);
     }
 }

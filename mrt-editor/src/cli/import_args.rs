@@ -1,7 +1,7 @@
 //! Flags of commands that read a mesh, and what they say about it.
 
 use crate::cli::output::{print_row, warn};
-use crate::import::ImportConfig;
+use crate::import::config::ImportConfig;
 use crate::import::error::ImportError;
 use crate::import::report::ImportReport;
 use clap::builder::{PossibleValuesParser, TypedValueParser};

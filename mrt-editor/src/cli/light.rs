@@ -16,7 +16,7 @@ use crate::cli::import_args::warn_of_import;
 use crate::cli::output::{folder_of, is_same_place, print_report};
 use crate::document::level_file::read_level;
 use crate::fit_level::mesh_samples::{MeshSample, sample_mesh};
-use crate::fit_level::paint::{PaintedMesh, coverage, material_albedos};
+use crate::fit_level::paint::{PaintedMesh, coverage, distances, material_albedos};
 use crate::import::report::ImportReport;
 use crate::import::{ImportedScene, read_scene};
 use crate::render::lit::LitScene;
@@ -171,7 +171,7 @@ fn check_coverage(
     receivers: &ReceiverMap,
     points: &[MeshSample],
 ) -> Result<(), LightCommandError> {
-    let found = coverage(level, receivers, points).near;
+    let found = coverage(points, &distances(level, receivers, points)).near;
     if found < LEAST_COVERAGE {
         return Err(LightCommandError::OtherMesh {
             path: args.level.clone(),

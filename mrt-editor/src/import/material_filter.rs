@@ -1,6 +1,6 @@
 //! Leaves out triangles by the names of their materials.
 
-use super::ImportConfig;
+use super::config::ImportConfig;
 use super::error::ImportError;
 use super::raw_mesh::RawMesh;
 use super::tool_materials::{fits, is_tool};

@@ -189,6 +189,15 @@ impl SurfaceColours {
         found
     }
 
+    /// All materials shine with one radiance.
+    #[cfg(test)]
+    pub(crate) fn with_emission(mut self, radiance: Vec3) -> Self {
+        for paint in &mut self.paints {
+            paint.emission = radiance;
+        }
+        self
+    }
+
     /// The range into which mean albedos of walls are moved: [`ALBEDO_RANGE`], or everything from 0 to 1 where the user set
     /// the albedo.
     pub fn albedo_range(&self) -> [f32; 2] {
@@ -262,4 +271,124 @@ fn finite_emission(paint: &Paint) -> Vec3 {
 
 fn interpolated([a, b, c]: [Vec3; 3], at: Vec2) -> Vec3 {
     a + (b - a) * at.x + (c - a) * at.y
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use image::codecs::png::PngEncoder;
+    use image::{ExtendedColorType, ImageEncoder};
+    use mrt_core::geometry::mesh::clean_and_trace;
+
+    /// White on the left, black on the right.
+    fn image(name: &str) -> RawImage {
+        let row = [[255; 3], [255; 3], [0; 3], [0; 3]].concat();
+        let mut bytes = Vec::new();
+        PngEncoder::new(&mut bytes)
+            .write_image(&row.repeat(4), 4, 4, ExtendedColorType::Rgb8)
+            .expect("encodes");
+        RawImage {
+            name: name.to_owned(),
+            bytes,
+        }
+    }
+
+    /// A triangle without area and one of 2 m², both of the first of `paints`.
+    fn raw(paints: Vec<Paint>) -> RawMesh {
+        let uvs = [Vec2::ZERO, 0.4 * Vec2::X, 0.4 * Vec2::Y];
+        RawMesh {
+            positions: [[9.0, 9.0], [0.0, 0.0], [2.0, 0.0], [0.0, 2.0]]
+                .map(|[x, y]| DVec3::new(x, y, 0.0))
+                .to_vec(),
+            triangles: vec![[0, 0, 1], [1, 2, 3]],
+            triangle_materials: vec![0, 0],
+            corner_uvs: vec![[Vec2::ONE; 3], uvs],
+            paints,
+            images: vec![image("a.png")],
+            ..RawMesh::default()
+        }
+    }
+
+    fn paint(colour: Option<Vec3>, image: Option<usize>) -> Paint {
+        let wrap = [Wrap::Repeat; 2];
+        Paint {
+            image: image.map(|image| PaintImage { image, wrap }),
+            ..Paint::new("wall", colour)
+        }
+    }
+
+    /// The albedo in the middle of the triangle that is left, averaged over `area`.
+    fn albedo(raw: &RawMesh, area: f32) -> (Vec3, MadeUp) {
+        let untidy = TriangleMesh {
+            triangle_materials: raw.triangle_materials.clone(),
+            ..TriangleMesh::from_triangles(
+                raw.positions.iter().map(|p| p.as_vec3()).collect(),
+                raw.triangles.clone(),
+            )
+        };
+        let (mesh, _, kept) = clean_and_trace(&untidy).expect("indices in range");
+        assert_eq!(
+            (&kept.triangles[..], &kept.vertices[..]),
+            (&[1][..], &[1, 2, 3][..])
+        );
+        let (colours, made_up) = SurfaceColours::new(raw, &mesh, &kept);
+        let at = SurfacePoint {
+            triangle: 0,
+            barycentric: Vec2::splat(1.0 / 3.0),
+            area,
+        };
+        (colours.albedo(&mesh, &at), made_up)
+    }
+
+    #[test]
+    fn colour_vertices_and_image_are_factors() {
+        let colour = Vec3::new(0.5, 0.4, 0.2);
+        let mut mesh = raw(vec![paint(Some(colour), Some(0))]);
+        mesh.colours = vec![Vec3::ZERO, Vec3::ONE, Vec3::ONE, Vec3::splat(0.1)];
+        // The triangle uses white texels only, though half of the image is black.
+        let (found, made_up) = albedo(&mesh, 0.1);
+        assert!((found - colour * 0.7).abs().max_element() < 1e-4, "{found}");
+        assert_eq!((made_up.colours, made_up.images), (0, 1));
+        // Over all of the image, half is black.
+        let (found, _) = albedo(&mesh, 1e6);
+        assert!(
+            (found - colour * 0.35).abs().max_element() < 1e-4,
+            "{found}"
+        );
+    }
+
+    #[test]
+    fn what_states_no_colour_is_grey_and_counted() {
+        let (found, made_up) = albedo(&raw(vec![paint(None, None)]), 0.0);
+        assert_eq!((found, made_up.colours), (Vec3::splat(UNSTATED_ALBEDO), 1));
+        assert_eq!(made_up.images, 0);
+        // An image or vertex colours alone are a colour.
+        let (found, made_up) = albedo(&raw(vec![paint(None, Some(0))]), 0.0);
+        assert_eq!((found, made_up.colours), (Vec3::ONE, 0));
+        let mut mesh = raw(vec![paint(None, None)]);
+        mesh.colours = vec![Vec3::splat(0.25); 4];
+        assert_eq!(albedo(&mesh, 0.0).0, Vec3::splat(0.25));
+        // White is what readers give to vertices without a colour.
+        mesh.colours = vec![Vec3::ONE; 4];
+        assert_eq!(albedo(&mesh, 0.0).0, Vec3::splat(UNSTATED_ALBEDO));
+    }
+
+    #[test]
+    fn an_image_that_cannot_be_read_is_grey_and_named_once() {
+        let mut mesh = raw(vec![paint(Some(Vec3::ONE), Some(0)), paint(None, Some(0))]);
+        mesh.images[0].bytes.truncate(40);
+        let (found, made_up) = albedo(&mesh, 0.0);
+        assert_eq!(found, Vec3::splat(UNSTATED_ALBEDO));
+        let [warning] = &made_up.warnings[..] else {
+            panic!("expected one warning, found {:?}", made_up.warnings);
+        };
+        assert!(
+            warning.contains("`wall`") && warning.contains("`a.png`"),
+            "{warning}"
+        );
+        // A paint may name an image that is not there.
+        let (found, _) = albedo(&raw(vec![paint(Some(Vec3::ONE), Some(7))]), 0.0);
+        assert_eq!(found, Vec3::splat(UNSTATED_ALBEDO));
+    }
 }
