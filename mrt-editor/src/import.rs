@@ -106,18 +106,7 @@ fn tidy(
         None => SurfaceColours::new(&raw, &mesh, &kept),
     };
     colours.paint_materials(&mut mesh);
-    let lights: Vec<Light> = raw
-        .lamps
-        .iter()
-        .filter_map(|lamp| lamps::light(lamp, &level_from_file))
-        .collect();
-    let faulty = raw.lamps.len() - lights.len();
-    if faulty > 0 {
-        raw.warnings.push(format!(
-            "{faulty} of {} lamps are left out: found values that are negative or not finite",
-            raw.lamps.len()
-        ));
-    }
+    let lights = place_lamps(&mut raw, &level_from_file);
     let mut report = ImportReport {
         left_out_materials: left_out.triangles,
         scale: config.scale,
@@ -133,6 +122,22 @@ fn tidy(
         reading,
         report,
     })
+}
+
+/// The file's lamps in the level. Says how many are faulty.
+fn place_lamps(raw: &mut RawMesh, level_from_file: &DAffine3) -> Vec<Light> {
+    let lamps = raw.lamps.iter();
+    let lights: Vec<Light> = lamps
+        .filter_map(|lamp| lamps::light(lamp, level_from_file))
+        .collect();
+    let faulty = raw.lamps.len() - lights.len();
+    if faulty > 0 {
+        raw.warnings.push(format!(
+            "{faulty} of {} lamps are left out: found values that are negative or not finite",
+            raw.lamps.len()
+        ));
+    }
+    lights
 }
 
 /// What a level keeps about its mesh.

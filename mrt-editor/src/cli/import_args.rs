@@ -148,8 +148,12 @@ impl ImportArgs {
 
 /// The flags as one would type them.
 fn material_flags(skip: &[String], only: &[String], keeps_tools: bool) -> String {
-    let skip = skip.iter().map(|name| format!("--skip-material {name}"));
-    let only = only.iter().map(|name| format!("--only-material {name}"));
+    let skip = skip
+        .iter()
+        .map(|name| format!("--skip-material {}", one_line(name)));
+    let only = only
+        .iter()
+        .map(|name| format!("--only-material {}", one_line(name)));
     let tools = keeps_tools.then(|| "--keep-tool-materials".to_owned());
     let flags: Vec<String> = skip.chain(only).chain(tools).collect();
     if flags.is_empty() {

@@ -17,7 +17,7 @@ pub const ALBEDO_RANGE: [f32; 2] = [0.05, 0.9];
 pub const MAX_IMAGE_SIDE: u32 = 16_384;
 
 /// Images that need more memory to decode are not read.
-pub const MAX_IMAGE_BYTES: u64 = 512 << 20;
+pub const MAX_DECODED_BYTES: u64 = 512 << 20;
 
 /// Albedo of what states no colour.
 pub const UNSTATED_ALBEDO: f32 = 0.53;

@@ -10,6 +10,9 @@ use std::path::Path;
 /// Names that an error lists, at most.
 const MOST_NAMES: usize = 12;
 
+/// Characters of a name in an error, at most.
+const MOST_CHARACTERS: usize = 80;
+
 /// What was left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct LeftOut {
@@ -32,7 +35,7 @@ pub(super) fn leave_out(
         if !raw.paints.iter().any(|paint| fits(pattern, &paint.name)) {
             return Err(ImportError::NoSuchMaterial {
                 path: path.to_owned(),
-                found: pattern.clone(),
+                found: readable(pattern),
                 expected: names(raw),
             });
         }
@@ -103,9 +106,20 @@ fn keep<T>(items: &mut Vec<T>, marks: &[bool]) {
     }
 }
 
+/// A name of bounded length that tells a terminal nothing but what to show.
+fn readable(name: &str) -> String {
+    name.chars()
+        .take(MOST_CHARACTERS)
+        .flat_map(char::escape_debug)
+        .collect()
+}
+
 /// The first names of materials, and how many more there are.
 fn names(raw: &RawMesh) -> String {
-    let quoted = raw.paints.iter().map(|paint| format!("`{}`", paint.name));
+    let quoted = raw
+        .paints
+        .iter()
+        .map(|paint| format!("`{}`", readable(&paint.name)));
     let mut names = quoted.take(MOST_NAMES).collect::<Vec<_>>().join(", ");
     let more = raw.paints.len().saturating_sub(MOST_NAMES);
     if more > 0 {

@@ -66,6 +66,7 @@ pub(super) enum Wrap {
 pub(super) struct RawImage {
     /// Its file's name, or its place in the scene's file; for messages.
     pub(super) name: String,
+    /// Empty if they cannot be had, about which the reader has a warning; the image then counts as grey.
     pub(super) bytes: Vec<u8>,
 }
 

@@ -1,10 +1,14 @@
 //! What colour a mesh has at each point: base colours times vertex colours times images.
 
 use super::limits::{ALBEDO_RANGE, UNSTATED_ALBEDO};
-use super::raw_mesh::{Paint, PaintImage, RawImage, RawMesh, Wrap};
+use super::raw_mesh::{Paint, PaintImage, RawMesh, Wrap};
 use super::texture::{Texture, longest_side};
 use glam::{Vec2, Vec3};
 use mrt_core::geometry::mesh::{Kept, TriangleMesh};
+use rayon::prelude::*;
+
+/// Images decoded at the same time, which bounds the memory that hostile ones take.
+const IMAGES_AT_ONCE: usize = 4;
 
 /// The colours of a mesh at each of its points. Made for one mesh, and of no use with another.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,37 +147,33 @@ impl SurfaceColours {
         is_used: &[bool],
         made_up: &mut MadeUp,
     ) -> Vec<Option<usize>> {
-        let mut user_of_image: Vec<Option<&Paint>> = vec![None; raw.images.len()];
-        for (paint, _) in raw.paints.iter().zip(is_used).filter(|&(_, &used)| used) {
-            if let Some(used) = paint.image
-                && let Some(user) = user_of_image.get_mut(used.image)
-            {
-                user.get_or_insert(paint);
+        let users = first_users(raw, is_used);
+        let wanted: Vec<(usize, &Paint)> = (0..users.len())
+            .filter_map(|k| Some((k, users[k]?)))
+            // Its reader has said already that it is missing.
+            .filter(|&(k, _)| !raw.images[k].bytes.is_empty())
+            .collect();
+        let longest = longest_side(wanted.len());
+        let mut texture_of_image = vec![None; users.len()];
+        for batch in wanted.chunks(IMAGES_AT_ONCE) {
+            let decode = |&(k, _): &(usize, &Paint)| Texture::decode(&raw.images[k].bytes, longest);
+            let decoded: Vec<_> = batch.par_iter().map(decode).collect();
+            for (&(k, user), decoded) in batch.iter().zip(decoded) {
+                match decoded {
+                    Ok(texture) => {
+                        texture_of_image[k] = Some(self.textures.len());
+                        self.textures.push(texture);
+                    }
+                    Err(reason) => made_up.warnings.push(format!(
+                        "material `{}`: image `{}` cannot be read ({reason}); expected a sound PNG, JPEG or WebP. It \
+                         counts as grey",
+                        user.name, raw.images[k].name
+                    )),
+                }
             }
         }
-        let longest = longest_side(user_of_image.iter().flatten().count());
-        let mut read = |(image, user): (&RawImage, Option<&Paint>)| match Texture::decode(
-            &image.bytes,
-            longest,
-        ) {
-            Ok(texture) => {
-                self.textures.push(texture);
-                made_up.images += 1;
-                Some(self.textures.len() - 1)
-            }
-            Err(reason) => {
-                made_up.warnings.push(format!(
-                        "material `{}`: image `{}` cannot be read ({reason}); expected a sound PNG, JPEG or \
-                         WebP. It counts as grey",
-                        user?.name, image.name
-                    ));
-                None
-            }
-        };
-        let images = raw.images.iter().zip(user_of_image);
-        images
-            .map(|(image, user)| user.and_then(|user| read((image, Some(user)))))
-            .collect()
+        made_up.images = self.textures.len();
+        texture_of_image
     }
 
     /// Materials of which a vertex has another colour than white, which readers give to vertices without one.
@@ -243,6 +243,17 @@ impl SurfaceColours {
     }
 }
 
+/// The first used paint of each image.
+fn first_users<'a>(raw: &'a RawMesh, is_used: &[bool]) -> Vec<Option<&'a Paint>> {
+    let mut users = vec![None; raw.images.len()];
+    for (paint, _) in raw.paints.iter().zip(is_used).filter(|&(_, &used)| used) {
+        if let Some(user) = paint.image.and_then(|used| users.get_mut(used.image)) {
+            user.get_or_insert(paint);
+        }
+    }
+    users
+}
+
 /// Which materials triangles use.
 pub(super) fn used(mesh: &TriangleMesh, count: usize) -> Vec<bool> {
     let mut is_used = vec![false; count];
@@ -276,6 +287,7 @@ fn interpolated([a, b, c]: [Vec3; 3], at: Vec2) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::raw_mesh::RawImage;
     use glam::DVec3;
     use image::codecs::png::PngEncoder;
     use image::{ExtendedColorType, ImageEncoder};
@@ -387,6 +399,11 @@ mod tests {
             warning.contains("`wall`") && warning.contains("`a.png`"),
             "{warning}"
         );
+        // Of an image without bytes, its reader has told.
+        mesh.images[0].bytes.clear();
+        let (found, made_up) = albedo(&mesh, 0.0);
+        assert_eq!(found, Vec3::splat(UNSTATED_ALBEDO));
+        assert!(made_up.warnings.is_empty());
         // A paint may name an image that is not there.
         let (found, _) = albedo(&raw(vec![paint(Some(Vec3::ONE), Some(7))]), 0.0);
         assert_eq!(found, Vec3::splat(UNSTATED_ALBEDO));

@@ -1,6 +1,6 @@
 //! Images of materials in linear light, filtered for areas of any size.
 
-use super::limits::{MAX_IMAGE_BYTES, MAX_IMAGE_SIDE};
+use super::limits::{MAX_DECODED_BYTES, MAX_IMAGE_SIDE};
 use super::raw_mesh::Wrap;
 use glam::{Vec2, Vec3};
 use image::{DynamicImage, ImageReader, Limits};
@@ -57,7 +57,7 @@ impl Texture {
         let mut limits = Limits::default();
         limits.max_image_width = Some(MAX_IMAGE_SIDE);
         limits.max_image_height = Some(MAX_IMAGE_SIDE);
-        limits.max_alloc = Some(MAX_IMAGE_BYTES);
+        limits.max_alloc = Some(MAX_DECODED_BYTES);
         reader.limits(limits);
         let image = reader.decode().map_err(|error| error.to_string())?;
         let (width, height) = (image.width() as usize, image.height() as usize);

@@ -477,16 +477,6 @@ mod tests {
             fault("\"rebuilt\"", "\"perfect\""),
             LevelTextError::UnknownTransport { block: 2, .. }
         ));
-        assert_eq!(
-            fault("up = \"z\"", "up = \"x\""),
-            LevelTextError::UnknownAxis {
-                found: "x".to_owned()
-            }
-        );
-        assert_eq!(
-            fault("scale = 0.1", "scale = 0.0"),
-            LevelTextError::Level(LevelError::MeshScale { found: 0.0 })
-        );
         assert!(!good.contains("canonical"));
         assert!(matches!(
             fault("\"+x\"", "\"up\""),
@@ -512,5 +502,37 @@ mod tests {
             Level::from_text("format = \"mrt-level\"\nversion = 1"),
             Err(LevelTextError::Level(LevelError::Empty))
         );
+    }
+
+    #[test]
+    fn faults_of_the_mesh_have_their_errors() {
+        let good = sample().to_text().expect("writes");
+        let fault = |from: &str, to: &str| {
+            assert!(good.contains(from), "{from} is not in the text");
+            Level::from_text(&good.replacen(from, to, 1)).expect_err("refused")
+        };
+        assert_eq!(
+            fault("up = \"z\"", "up = \"x\""),
+            LevelTextError::UnknownAxis {
+                found: "x".to_owned()
+            }
+        );
+        assert_eq!(
+            fault("scale = 0.1", "scale = 0.0"),
+            LevelTextError::Level(LevelError::MeshScale { found: 0.0 })
+        );
+        assert!(matches!(
+            fault("origin = [1", "origin = [inf, 1"),
+            LevelTextError::Malformed(_)
+        ));
+        assert!(matches!(
+            fault("origin = [10000000.0", "origin = [inf"),
+            LevelTextError::Level(LevelError::MeshOrigin { .. })
+        ));
+        // A level of before has no mesh.
+        let start = good.find("[mesh]").expect("a mesh");
+        let end = good.find("[[block]]").expect("a block");
+        let level = Level::from_text(&[&good[..start], &good[end..]].concat()).expect("reads");
+        assert_eq!(level.mesh, None);
     }
 }
