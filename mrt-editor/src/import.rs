@@ -6,9 +6,10 @@
 pub mod error;
 pub mod limits;
 mod file;
-mod glb;
-mod obj;
+mod neighbour;
 mod raw_mesh;
+mod gltf;
+mod obj;
 pub mod report;
 
 use error::ImportError;
@@ -49,7 +50,7 @@ pub struct ImportedScene {
     pub report: ImportReport,
 }
 
-/// Reads an OBJ or GLB file, by how its name ends.
+/// Reads an OBJ or glTF file, by how its name ends.
 ///
 /// # Errors
 /// [`ImportError`]; faulty triangles are no error as long as one is good.
@@ -76,7 +77,7 @@ fn read_raw(path: &Path) -> Result<RawMesh, ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let read = match ending.to_ascii_lowercase().as_str() {
         "obj" => obj::read,
-        "glb" => glb::read,
+        "glb" | "gltf" => gltf::read,
         _ => {
             return Err(ImportError::UnknownFormat {
                 path: path.to_owned(),
