@@ -3,6 +3,7 @@
 mod accuracy;
 mod adapt;
 mod bake;
+mod cases_gltf;
 mod common;
 mod demo;
 mod info;

@@ -70,9 +70,14 @@ fn parse(json: &[u8]) -> Result<Document, Fault> {
     // Some exporters write names in the code page of their machine.
     let json = String::from_utf8_lossy(json);
     check_size(&json)?;
-    let fault = |error: serde_json::Error| Fault::Malformed {
-        place: format!("JSON: {}", shown(&error.to_string())),
-        expected: "a glTF 2.0 document",
+    let fault = |error: serde_json::Error| {
+        let text = error.to_string();
+        let reason = text.split(" at line ").next().unwrap_or_default();
+        let (line, column) = (error.line(), error.column());
+        Fault::Malformed {
+            place: format!("JSON, line {line}, column {column}: {}", shown(reason)),
+            expected: "a glTF 2.0 document",
+        }
     };
     let head: Head = serde_json::from_str(&json).map_err(fault)?;
     check_version(&head)?;
