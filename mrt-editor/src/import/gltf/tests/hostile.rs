@@ -147,9 +147,6 @@ fn compressed_meshes_are_refused_unless_plain_numbers_stand_beside() {
     };
     let mesh = read_changed(&[(r#""material":0"#, draco)]).expect("reads");
     assert_eq!(mesh.triangles.len(), 1);
-    let no_data = r#"[{"uri":"none","byteLength":40}]"#;
-    let plain = [(r#"[{"byteLength":40}]"#, no_data)];
-    assert!(read_changed(&plain).is_err());
     let view = r#""bufferViews":[{"buffer":0"#;
     for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
         let with = meshopt(name);
@@ -220,7 +217,7 @@ fn too_much_is_refused_before_it_is_made() {
         zeros,
         1,
     );
-    let many_triangles = TRIANGLE.replacen(r#""mode":4"#, "", 1).replacen(
+    let many_triangles = TRIANGLE.replacen(
         r#"36,"componentType":5121,"count":3"#,
         r#"36,"componentType":5121,"count":180000000"#,
         1,
