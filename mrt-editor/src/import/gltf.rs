@@ -61,10 +61,17 @@ fn read_mesh(folder: &Path, bytes: &[u8]) -> Result<RawMesh, Fault> {
         images,
         pose,
         mesh,
+        without_coordinates: 0,
     };
     for placed in &placement.nodes {
         builder.add_node(placed)?;
         lamps::add(document, placed, &mut builder.mesh)?;
+    }
+    if builder.without_coordinates > 0 {
+        builder.mesh.warnings.push(format!(
+            "{} primitives have an image but no coordinates in it: the image's upper left corner colours them",
+            builder.without_coordinates
+        ));
     }
     Ok(builder.mesh)
 }
@@ -91,6 +98,8 @@ struct Builder<'a> {
     images: Vec<Option<ImageCoordinates>>,
     pose: Pose,
     mesh: RawMesh,
+    /// Primitives of materials with an image that have no coordinates in it.
+    without_coordinates: usize,
 }
 
 impl Builder<'_> {
@@ -125,6 +134,9 @@ impl Builder<'_> {
             let Some(mut geometry) = primitives::read(&mut self.buffers, at)? else {
                 continue;
             };
+            if at.image.is_some() && geometry.image_points.is_none() {
+                self.without_coordinates += 1;
+            }
             if let Some(joints) = &joints {
                 let attributes = (&primitive.attributes, place.as_str());
                 let positions = &mut geometry.positions;

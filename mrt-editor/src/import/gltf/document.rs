@@ -122,6 +122,13 @@ pub(super) struct Primitive {
     pub(super) extensions: PrimitiveExtensions,
 }
 
+impl Primitive {
+    /// 4 where the file names none: triangles.
+    pub(super) fn mode(&self) -> u32 {
+        self.mode.unwrap_or(4)
+    }
+}
+
 #[derive(Default, Deserialize)]
 #[serde(default)]
 pub(super) struct PrimitiveExtensions {

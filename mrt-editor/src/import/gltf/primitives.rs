@@ -28,13 +28,6 @@ pub(super) struct PrimitiveAt<'a> {
     pub(super) image: Option<ImageCoordinates>,
 }
 
-impl Primitive {
-    /// 4 where the file names none: triangles.
-    pub(super) fn mode(&self) -> u32 {
-        self.mode.unwrap_or(4)
-    }
-}
-
 /// The weights of morph targets at a node.
 pub(super) fn weights<'a>(node: &'a [f64], mesh: &'a Mesh) -> &'a [f64] {
     if node.is_empty() { &mesh.weights } else { node }

@@ -4,99 +4,102 @@ use super::{Document, TRIANGLE, floats, glb, read, read_changed, sentence, trian
 use crate::import::gltf::read_mesh;
 use std::path::Path;
 
+/// A text of the document, what stands there instead, and what the message says.
+const FAULTS: [[&str; 3]; 25] = [
+    [r#""nodes":[0]"#, r#""nodes":[7]"#, "scenes[0]: node 7 of 2"],
+    [
+        r#""children":[1]"#,
+        r#""children":[7]"#,
+        "nodes[0]: node 7 of 2",
+    ],
+    [
+        r#""children":[1]"#,
+        r#""children":[0]"#,
+        "nodes[0]: expected nodes without a circle",
+    ],
+    [
+        r#""scenes""#,
+        r#""scene":3,"scenes""#,
+        "scene: scene 3 of 1",
+    ],
+    [r#""mesh":0"#, r#""mesh":9"#, "nodes[1]: mesh 9 of 1"],
+    [r#""mesh":0"#, r#""mesh":0,"skin":0"#, "skin 0 of 0"],
+    [
+        r#""POSITION":0"#,
+        r#""POSITION":9"#,
+        "meshes[0].primitives[0]: accessor 9 of 2",
+    ],
+    [
+        r#""POSITION":0"#,
+        r#""POSITION":1"#,
+        "accessors[1]: its type: expected VEC3",
+    ],
+    [
+        r#""indices":1"#,
+        r#""indices":0"#,
+        "accessors[0]: expected unsigned",
+    ],
+    [r#""indices":1"#, r#""indices":2"#, "accessor 2 of 2"],
+    [r#""material":0"#, r#""material":5"#, "material 5 of 1"],
+    [r#""material":0"#, r#""mode":7"#, "mode 7"],
+    [r#""count":3"#, r#""count":0"#, "vertex 0 of 0"],
+    [
+        r#""count":3"#,
+        r#""count":4"#,
+        "accessors[0]: expected its data",
+    ],
+    [
+        r#""componentType":5126"#,
+        r#""componentType":5124"#,
+        "componentType 5124",
+    ],
+    [
+        r#""byteOffset":36"#,
+        r#""byteOffset":38"#,
+        "accessors[1]: expected its data",
+    ],
+    [
+        r#""byteOffset":36"#,
+        r#""byteOffset":14"#,
+        "vertex 128 of 3",
+    ],
+    [
+        r#""byteLength":40"#,
+        r#""byteLength":41"#,
+        "bufferViews[0]: expected its data",
+    ],
+    [
+        r#""byteLength":40"#,
+        r#""byteOffset":18446744073709551615,"byteLength":40"#,
+        "bufferViews[0]",
+    ],
+    [
+        r#""buffer":0"#,
+        r#""buffer":1"#,
+        "bufferViews[0]: buffer 1 of 1",
+    ],
+    [
+        r#""bufferView":0"#,
+        r#""bufferView":8"#,
+        "accessors[0]: buffer view 8 of 1",
+    ],
+    [
+        r#""version":"2.0""#,
+        r#""version":"1.0""#,
+        "asset: version 1.0",
+    ],
+    [r#""version":"2.0""#, r#""version":1"#, "asset: version 1"],
+    [
+        r#""version":"2.0""#,
+        r#""version":"2.1","minVersion":"2.1""#,
+        "asset: least version 2.1",
+    ],
+    [r#""mesh":0"#, r#""mesh":-1"#, "JSON, line 2"],
+];
+
 #[test]
 fn every_index_and_offset_is_checked() {
-    for (from, to, place) in [
-        (r#""nodes":[0]"#, r#""nodes":[7]"#, "scenes[0]: node 7 of 2"),
-        (
-            r#""children":[1]"#,
-            r#""children":[7]"#,
-            "nodes[0]: node 7 of 2",
-        ),
-        (
-            r#""children":[1]"#,
-            r#""children":[0]"#,
-            "nodes[0]: expected nodes without a circle",
-        ),
-        (
-            r#""scenes""#,
-            r#""scene":3,"scenes""#,
-            "scene: scene 3 of 1",
-        ),
-        (r#""mesh":0"#, r#""mesh":9"#, "nodes[1]: mesh 9 of 1"),
-        (r#""mesh":0"#, r#""mesh":0,"skin":0"#, "skin 0 of 0"),
-        (
-            r#""POSITION":0"#,
-            r#""POSITION":9"#,
-            "meshes[0].primitives[0]: accessor 9 of 2",
-        ),
-        (
-            r#""POSITION":0"#,
-            r#""POSITION":1"#,
-            "accessors[1]: its type: expected VEC3",
-        ),
-        (
-            r#""indices":1"#,
-            r#""indices":0"#,
-            "accessors[0]: expected unsigned",
-        ),
-        (r#""indices":1"#, r#""indices":2"#, "accessor 2 of 2"),
-        (r#""material":0"#, r#""material":5"#, "material 5 of 1"),
-        (r#""material":0"#, r#""mode":7"#, "mode 7"),
-        (r#""count":3"#, r#""count":0"#, "vertex 0 of 0"),
-        (
-            r#""count":3"#,
-            r#""count":4"#,
-            "accessors[0]: expected its data",
-        ),
-        (
-            r#""componentType":5126"#,
-            r#""componentType":5124"#,
-            "componentType 5124",
-        ),
-        (
-            r#""byteOffset":36"#,
-            r#""byteOffset":38"#,
-            "accessors[1]: expected its data",
-        ),
-        (
-            r#""byteOffset":36"#,
-            r#""byteOffset":14"#,
-            "vertex 128 of 3",
-        ),
-        (
-            r#""byteLength":40"#,
-            r#""byteLength":41"#,
-            "bufferViews[0]: expected its data",
-        ),
-        (
-            r#""byteLength":40"#,
-            r#""byteOffset":18446744073709551615,"byteLength":40"#,
-            "bufferViews[0]",
-        ),
-        (
-            r#""buffer":0"#,
-            r#""buffer":1"#,
-            "bufferViews[0]: buffer 1 of 1",
-        ),
-        (
-            r#""bufferView":0"#,
-            r#""bufferView":8"#,
-            "accessors[0]: buffer view 8 of 1",
-        ),
-        (
-            r#""version":"2.0""#,
-            r#""version":"1.0""#,
-            "asset: version 1.0",
-        ),
-        (r#""version":"2.0""#, r#""version":1"#, "asset: version 1"),
-        (
-            r#""version":"2.0""#,
-            r#""version":"2.1","minVersion":"2.1""#,
-            "asset: least version 2.1",
-        ),
-        (r#""mesh":0"#, r#""mesh":-1"#, "JSON, line 2"),
-    ] {
+    for [from, to, place] in FAULTS {
         let error = sentence(read_changed(&[(from, to)]).expect_err(to));
         assert!(error.contains(place), "{to}: {error}");
         assert_eq!(error.lines().count(), 1, "{error}");
