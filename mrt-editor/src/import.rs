@@ -6,8 +6,9 @@ pub mod limits;
 pub mod error;
 pub mod config;
 mod file;
+mod neighbour;
 mod raw_mesh;
-mod glb;
+mod gltf;
 mod obj;
 mod texture;
 pub mod surface_colours;
@@ -46,7 +47,7 @@ pub struct ImportedScene {
     pub report: ImportReport,
 }
 
-/// Reads an OBJ or GLB file, by how its name ends.
+/// Reads an OBJ or glTF file, by how its name ends.
 ///
 /// # Errors
 /// [`ImportError`]; faulty triangles are no error as long as one is good.
@@ -59,7 +60,7 @@ fn read_raw(path: &Path) -> Result<RawMesh, ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
     let read = match ending.to_ascii_lowercase().as_str() {
         "obj" => obj::read,
-        "glb" => glb::read,
+        "glb" | "gltf" => gltf::read,
         _ => {
             return Err(ImportError::UnknownFormat {
                 path: path.to_owned(),

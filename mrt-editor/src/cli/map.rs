@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Maps a mesh to a level of connected blocks.
 #[derive(Clone, Debug, clap::Args)]
 pub struct MapArgs {
-    /// Mesh to map: .obj or .glb.
+    /// Mesh to map: .obj, .glb or .gltf.
     #[arg(long)]
     pub scene: PathBuf,
     /// Level file to write.

@@ -22,8 +22,8 @@ pub enum ImportError {
         /// Bytes that were read before it was refused.
         found: u64,
     },
-    /// The file's name ends in neither `.obj` nor `.glb`.
-    #[error("scene {}: found a file ending in `{found}`; expected .obj or .glb", path.display())]
+    /// The file's name ends in none of `.obj`, `.glb` and `.gltf`.
+    #[error("scene {}: found a file ending in `{found}`; expected .obj, .glb or .gltf", path.display())]
     UnknownFormat {
         /// Which file.
         path: PathBuf,
@@ -39,6 +39,24 @@ pub enum ImportError {
         place: String,
         /// What should be there.
         expected: &'static str,
+    },
+    /// The file needs what this reader cannot do.
+    #[error("scene {}: {found}", path.display())]
+    Unsupported {
+        /// Which file.
+        path: PathBuf,
+        /// A sentence about what it needs and what to do.
+        found: String,
+    },
+    /// A file that the scene names and needs cannot be read.
+    #[error("scene {}, its file `{name}`: {reason}", path.display())]
+    Neighbour {
+        /// Which scene.
+        path: PathBuf,
+        /// The file's name in the scene.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
     },
     /// No triangle can be lit.
     #[error(

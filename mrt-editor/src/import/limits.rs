@@ -21,3 +21,27 @@ pub const MAX_DECODED_BYTES: u64 = 512 << 20;
 
 /// Albedo of what states no colour.
 pub const UNSTATED_ALBEDO: f32 = 0.53;
+
+/// More bytes in the files and images that a scene names, all together, are not kept.
+pub const MAX_NEIGHBOUR_BYTES: u64 = 1 << 30;
+
+/// More objects and lists in a glTF document are refused before they are read: each takes some hundred bytes.
+pub const MAX_JSON_CONTAINERS: usize = 4_000_000;
+
+/// More numbers and names in a glTF document are refused before they are read: each takes some ten bytes.
+pub const MAX_JSON_VALUES: usize = 32_000_000;
+
+/// More visits to nodes of a glTF scene are refused: a few nodes that share children can ask for 2^256.
+pub const MAX_NODE_VISITS: usize = 1_000_000;
+
+/// More positions than this, counted with instances and before they are made, are refused.
+pub const MAX_POSITIONS: usize = 50_000_000;
+
+/// More triangles than this, counted with instances and before they are made, are refused.
+pub const MAX_TRIANGLES: usize = 50_000_000;
+
+/// More lamps than this are refused.
+pub const MAX_LAMPS: usize = 4096;
+
+/// Longer names of materials are cut, in characters.
+pub const MAX_NAME_CHARACTERS: usize = 128;

@@ -4,6 +4,7 @@ mod accuracy;
 mod adapt;
 mod bake;
 mod cases_colour;
+mod cases_gltf;
 mod common;
 mod demo;
 mod info;

@@ -11,7 +11,7 @@ const MOST_PIXELS_A_SIDE: usize = 16_384;
 /// Lights a real mesh through its blocks: pictures, the lightmap, and the mesh with its coordinates.
 #[derive(Clone, Debug, clap::Args)]
 pub struct LightArgs {
-    /// Mesh to light: .obj or .glb.
+    /// Mesh to light: .obj, .glb or .gltf.
     #[arg(long)]
     pub scene: PathBuf,
     /// Level around the mesh, as `map` writes it.
