@@ -3,6 +3,7 @@
 mod accuracy;
 mod adapt;
 mod bake;
+mod cases_obj;
 mod common;
 mod demo;
 mod info;
