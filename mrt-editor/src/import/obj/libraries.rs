@@ -116,12 +116,12 @@ fn library_names(line: &[u8], is_there: impl Fn(&[u8]) -> bool) -> Vec<Vec<u8>> 
     {
         return vec![whole.to_vec()];
     }
-    let words = split(short);
+    let words = split(line);
     let mut names = Vec::new();
     let mut first = 0;
     while first < words.len() && names.len() <= MAX_LIBRARIES {
         let longest = words.len().min(first + MAX_NAME_WORDS);
-        let joined = |end: usize| join(short, &words[first..end]);
+        let joined = |end: usize| join(line, &words[first..end]);
         let found = (first + 1..=longest)
             .rev()
             .find(|&end| is_there(&joined(end)));
@@ -146,7 +146,7 @@ struct Word {
     text: Vec<u8>,
 }
 
-/// Splits at white space that is neither quoted nor after a backslash.
+/// Splits at white space that is neither quoted nor after a backslash, up to a comment.
 fn split(line: &[u8]) -> Vec<Word> {
     let mut words: Vec<Word> = Vec::new();
     let mut is_open = false;
@@ -160,6 +160,9 @@ fn split(line: &[u8]) -> Vec<Word> {
             continue;
         }
         if !is_open {
+            if line[k] == b'#' {
+                break;
+            }
             is_open = true;
             words.push(Word {
                 begin: k,
@@ -214,6 +217,8 @@ mod tests {
             ("b.mtl my lib.mtl a.mtl", &["b.mtl", "my lib.mtl", "a.mtl"]),
             ("a#b.mtl", &["a#b.mtl"]),
             ("my #1.mtl", &["my #1.mtl"]),
+            ("my\\ #1.mtl # mine", &["my #1.mtl"]),
+            ("\"my #1.mtl\" # mine", &["my #1.mtl"]),
             ("dir\\c.mtl plain", &["dir\\c.mtl", "plain"]),
             ("gone.mtl", &["gone.mtl"]),
             ("gone far.mtl b.mtl", &["gone far.mtl", "b.mtl"]),

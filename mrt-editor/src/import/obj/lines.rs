@@ -151,7 +151,7 @@ mod tests {
             let text = "a\n\n b 1 \\\n 2\\\n\\\n3 \nc".replace('\n', end);
             assert_eq!(
                 lines(&text),
-                expected(&[(1, "a"), (2, ""), (3, "b 1   2  3"), (6, "c")]),
+                expected(&[(1, "a"), (2, ""), (3, "b 1   2  3"), (7, "c")]),
                 "{end:?}"
             );
         }

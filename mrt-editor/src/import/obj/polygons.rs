@@ -4,6 +4,7 @@
 
 use earcut::Earcut;
 use glam::DVec3;
+use std::collections::HashMap;
 
 /// Smaller than this times the square of its extent, a polygon's area is rounding.
 const NO_AREA: f64 = 1e-12;
@@ -91,25 +92,97 @@ impl Cutter {
             let corner = corner - origin;
             [corner[u], corner[v]]
         }));
-        self.earcut.earcut_slice(&self.flat, &[], &mut self.ears);
-        let ears = self.ears.as_chunks::<3>().0;
-        let turn = |ear: &[u32; 3]| {
-            let [a, b, c] = ear.map(|k| self.flat[k as usize]);
-            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-        };
-        let area: f64 = ears.iter().map(turn).sum();
-        match area < 0.0 {
-            true => self
-                .triangles
-                .extend(ears.iter().map(|&[a, b, c]| [a, c, b])),
-            false => self.triangles.extend(ears),
-        }
         let wanted = twice_area[axis].abs();
-        match (area.abs() - wanted).abs() <= AREA_TOLERANCE * wanted {
-            true => Cut::Whole,
-            false => Cut::Crossing,
+        let order: Vec<u32> = (0..corners.len() as u32).collect();
+        if self.clip(&order, &[], wanted) {
+            return Cut::Whole;
+        }
+        // Rounding of keyholes beside one another can leave no ear to clip; as holes they do no harm.
+        let plain = std::mem::take(&mut self.triangles);
+        match without_keyholes(&self.flat) {
+            Some((order, holes)) if self.clip(&order, &holes, wanted) => Cut::Whole,
+            _ => {
+                self.triangles = plain;
+                Cut::Crossing
+            }
         }
     }
+
+    /// Clips the ears of the outline that `order` tells, whose holes begin at `holes`; true if the area is as `wanted`.
+    fn clip(&mut self, order: &[u32], holes: &[u32], wanted: f64) -> bool {
+        let corners = order.iter().map(|&corner| self.flat[corner as usize]);
+        self.earcut.earcut(corners, holes, &mut self.ears);
+        let ears = self.ears.as_chunks::<3>().0.iter();
+        let ears = ears.map(|ear| ear.map(|k| order[k as usize]));
+        let area: f64 = ears
+            .clone()
+            .map(|ear| twice_area_flat(&self.flat, &ear))
+            .sum();
+        self.triangles.clear();
+        match area < 0.0 {
+            true => self.triangles.extend(ears.map(|[a, b, c]| [a, c, b])),
+            false => self.triangles.extend(ears),
+        }
+        (area.abs() - wanted).abs() <= AREA_TOLERANCE * wanted
+    }
+}
+
+/// The corners of an outline in which holes hang on keyholes, and then of its holes, and where each hole begins. `None` if
+/// there is no hole, or more than one outline.
+fn without_keyholes(flat: &[[f64; 2]]) -> Option<(Vec<u32>, Vec<u32>)> {
+    // Where the outline comes back to a corner, what lies between is a ring of its own.
+    let key = |corner: u32| flat[corner as usize].map(|x| (x + 0.0).to_bits());
+    let mut open: Vec<u32> = Vec::new();
+    let mut place_of = HashMap::new();
+    let mut rings = Vec::new();
+    for corner in 0..flat.len() as u32 {
+        match place_of.get(&key(corner)).copied() {
+            Some(place) => {
+                let ring = open.split_off(place);
+                open.push(ring[0]);
+                for &corner in &ring[1..] {
+                    place_of.remove(&key(corner));
+                }
+                rings.push(ring);
+            }
+            None => {
+                place_of.insert(key(corner), open.len());
+                open.push(corner);
+            }
+        }
+    }
+    rings.push(open);
+    let mut rings: Vec<(f64, Vec<u32>)> = rings
+        .into_iter()
+        .map(|ring| (twice_area_flat(flat, &ring), ring))
+        .collect();
+    rings.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let (outer_area, mut order) = rings.swap_remove(0);
+    // The two sides of a keyhole may have corners of their own; between them lies nothing but rounding.
+    rings.retain(|(area, _)| area.abs() > AREA_TOLERANCE * outer_area);
+    if rings.is_empty() || rings.iter().any(|&(area, _)| area > 0.0) {
+        return None;
+    }
+    let mut holes = Vec::new();
+    for (_, ring) in rings {
+        holes.push(order.len() as u32);
+        order.extend(ring);
+    }
+    Some((order, holes))
+}
+
+fn twice_area_flat(flat: &[[f64; 2]], ring: &[u32]) -> f64 {
+    let [x, y] = flat[ring[0] as usize];
+    let from_first = |corner: u32| {
+        let corner = flat[corner as usize];
+        [corner[0] - x, corner[1] - y]
+    };
+    ring.windows(2)
+        .map(|pair| {
+            let [a, b] = [from_first(pair[0]), from_first(pair[1])];
+            a[0] * b[1] - a[1] * b[0]
+        })
+        .sum()
 }
 
 /// Twice the area, along the normal, after Newell.
