@@ -58,6 +58,18 @@ pub enum ImportError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A line of a text file is faulty.
+    #[error("scene {}, line {line}: found `{found}`; expected {expected}", path.display())]
+    Line {
+        /// Which file.
+        path: PathBuf,
+        /// Number of the line, from 1; of a wrapped line, its first.
+        line: usize,
+        /// The word at fault, readable.
+        found: String,
+        /// What should be there.
+        expected: String,
+    },
     /// No triangle can be lit.
     #[error(
         "scene {}: found {found} triangles, none with an area and finite corners; expected at least \

@@ -3,8 +3,27 @@
 /// Larger files are refused before they are read.
 pub const MAX_FILE_BYTES: u64 = 1 << 30;
 
-/// Only this much of a material library is read.
-pub const MAX_LIBRARY_BYTES: u64 = 16 << 20;
+/// So many material libraries are opened for a scene.
+pub const MAX_LIBRARIES: usize = 256;
+
+/// All material libraries of a scene together have at most so many bytes; those beyond are not read.
+pub const MAX_LIBRARY_BYTES: u64 = 64 << 20;
+
+/// So many image files are opened for a scene.
+pub const MAX_IMAGES: usize = 4096;
+
+/// All image files of a scene together have at most so many bytes; those beyond are not read.
+pub const MAX_IMAGE_BYTES: u64 = 512 << 20;
+
+/// An OBJ of more triangles, or of more vertices or texture coordinates, is refused before they take the memory.
+pub const MAX_OBJ_ELEMENTS: usize = 50_000_000;
+
+/// An OBJ that names more materials is refused.
+pub const MAX_OBJ_MATERIALS: usize = 1_000_000;
+
+/// Faces of more corners than this are refused: no modeller writes them, and cutting them takes a time that grows with
+/// the square of this number.
+pub const MAX_POLYGON_CORNERS: usize = 16_384;
 
 /// Larger coordinates, in metres, are refused: squared distances have to stay finite.
 pub const MAX_COORDINATE_M: f64 = 1e9;

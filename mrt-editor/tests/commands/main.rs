@@ -5,6 +5,7 @@ mod adapt;
 mod bake;
 mod cases_colour;
 mod cases_gltf;
+mod cases_obj;
 mod common;
 mod demo;
 mod info;
