@@ -25,6 +25,8 @@ use mrt_core::geometry::mesh::{TriangleMesh, bounds};
 use mrt_runtime::Level;
 use mrt_runtime::LevelError;
 use mrt_runtime::blocks::{SHAPES, Shape};
+use mrt_runtime::low_level::output::receiver::ReceiverMap;
+use paint::{PaintReport, PaintedMesh, coverage, distances, paint_level};
 use voxels::{FreeSpace, VoxelGrid, Winding, find_free_space};
 
 /// Points spread over the mesh to measure albedos and coverage.
@@ -41,6 +43,13 @@ const VOXELS_A_CELL: f64 = 10.0;
 
 /// Free space lower than this share of a cell belongs to no room.
 const LEAST_HEADROOM: f64 = 0.2;
+
+/// Rooms lower than this share of a cell are lost, and those of less than two voxels are not found: a cell has at most so
+/// many heights of a room.
+const HEIGHTS_A_CELL: f64 = VOXELS_A_CELL / 2.0;
+
+/// Enclosed volume over the area to the power of 1.5 above which a mesh is a solid.
+const LEAST_SOLIDITY: f64 = 2e-3;
 
 /// A level around a mesh.
 #[derive(Clone, Debug)]
@@ -59,15 +68,18 @@ pub struct Mapped {
     pub is_reversed: bool,
     /// How much of the mesh the blocks hold.
     pub coverage: paint::Coverage,
+    /// What the walls got.
+    pub paint: PaintReport,
 }
 
 /// Makes a level around a mesh.
 ///
 /// # Errors
 /// [`MapError`]; a mesh without rooms has no grid level.
-pub fn map_mesh(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapError> {
+pub fn map_mesh(painted: PaintedMesh<'_>, config: &MapConfig) -> Result<Mapped, MapError> {
     config.check()?;
-    let points = mesh_samples::sample_mesh(mesh, SURFACE_POINTS);
+    let mesh = painted.mesh;
+    let mut points = mesh_samples::sample_mesh(mesh, SURFACE_POINTS);
     let mut mapped = match config.fit {
         Fit::Box => {
             let places: Vec<Vec3> = points.iter().map(|point| point.position).collect();
@@ -75,7 +87,16 @@ pub fn map_mesh(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapEr
         }
         Fit::Grid => map_to_grid(mesh, config)?,
     };
-    mapped.coverage = paint::paint_level(&mut mapped.level, mesh, &points);
+    if mapped.is_reversed || config.winding == Winding::Back {
+        for point in &mut points {
+            point.normal = -point.normal;
+        }
+    }
+    let receivers = ReceiverMap::new(&mapped.level);
+    let distances = distances(&mapped.level, &receivers, &points);
+    mapped.coverage = coverage(&points, &distances);
+    let level = &mut mapped.level;
+    mapped.paint = paint_level(level, painted, &receivers, &points, &distances);
     mapped.level.check()?;
     Ok(mapped)
 }
@@ -84,7 +105,10 @@ fn map_to_grid(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapErr
     let voxelizer = Voxelizer::new(mesh, config.winding)?;
     let cell = cell_width(&voxelizer, config)?;
     let space = voxelizer.free_space((cell / VOXELS_A_CELL).max(voxelizer.finest()))?;
-    let joined = cut_and_join(&space, cell, config)?;
+    let joined = cut_and_join(&space, cell, config).map_err(|error| match error {
+        MapError::NoFreeSpace => voxelizer.why_no_free_space(config),
+        error => error,
+    })?;
     Ok(Mapped {
         cell,
         crumbs: joined.crumbs,
@@ -132,6 +156,41 @@ impl Voxelizer {
         let grid = VoxelGrid::around(self.low, self.high, edge);
         find_free_space(&self.triangles, grid, self.winding).ok_or(MapError::TooDense)
     }
+
+    /// The cause that explains best why no free space was found.
+    fn why_no_free_space(&self, config: &MapConfig) -> MapError {
+        let coarse = || self.free_space(self.edge(FIRST_VOXELS)).ok();
+        if let Some(found) = config.cell
+            && let Some(height) = coarse().and_then(|space| room_height(&space))
+            && found > HEIGHTS_A_CELL * height
+        {
+            let expected = HEIGHTS_A_CELL * height;
+            return MapError::CellTooLarge { expected, found };
+        }
+        if self.winding != Winding::Both && self.is_solid() {
+            return MapError::Solid;
+        }
+        MapError::NoFreeSpace
+    }
+
+    /// True if the faces look away from what they enclose, as those of a statue: by the divergence theorem, the volume that
+    /// they enclose is then positive. A mesh that encloses next to nothing for its area is not solid but open.
+    fn is_solid(&self) -> bool {
+        let center = (self.low + self.high).as_dvec3() / 2.0;
+        let (mut volume, mut area) = (0.0, 0.0);
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|corner| corner.as_dvec3() - center);
+            volume += a.dot(b.cross(c)) / 6.0;
+            area += (b - a).cross(c - a).length() / 2.0;
+        }
+        let outward = if self.winding == Winding::Back {
+            -volume
+        } else {
+            volume
+        };
+        // A ball has 1 / (6 sqrt(pi)) = 0.094, a box of 100 : 10 : 1 still 0.0094.
+        outward > LEAST_SOLIDITY * area.powf(1.5)
+    }
 }
 
 /// The width asked for, or one that suits the rooms, metres.
@@ -144,15 +203,20 @@ fn cell_width(voxelizer: &Voxelizer, config: &MapConfig) -> Result<f64, MapError
         Some(cell) => Ok(cell),
         None => {
             let space = voxelizer.free_space(voxelizer.edge(FIRST_VOXELS))?;
-            usual_cell(&space, config.max_blocks).ok_or(MapError::NoFreeSpace)
+            usual_cell(&space, config.max_blocks).ok_or_else(|| voxelizer.why_no_free_space(config))
         }
     }
+}
+
+/// The rooms' typical height, metres; `None` without free space.
+fn room_height(space: &FreeSpace) -> Option<f64> {
+    ColumnRuns::new(space, 0.0).typical_height()
 }
 
 /// The rooms' typical height, which makes cubes. In levels of rooms of several sizes less, as far as half of the blocks
 /// allow. `None` without free space.
 fn usual_cell(space: &FreeSpace, max_blocks: usize) -> Option<f64> {
-    let height = ColumnRuns::new(space, 0.0).typical_height()?;
+    let height = room_height(space)?;
     let volume = space.free_count() as f64 * space.grid.edge.powi(3);
     let is_one_room = volume < 8.0 * height.powi(3);
     if is_one_room {
@@ -196,6 +260,7 @@ impl Mapped {
             closed_passages: 0,
             is_reversed: false,
             coverage: paint::Coverage::default(),
+            paint: PaintReport::default(),
         }
     }
 }
@@ -207,6 +272,7 @@ fn closed_shape() -> &'static Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::surface_colours::SurfaceColours;
     use mrt_core::geometry::cube::Face;
     use std::collections::HashSet;
 
@@ -257,7 +323,12 @@ mod tests {
             cell: Some(cell),
             ..MapConfig::default()
         };
-        map_mesh(mesh, &config).expect("a level")
+        map_grey(mesh, &config).expect("a level")
+    }
+
+    fn map_grey(mesh: &TriangleMesh, config: &MapConfig) -> Result<Mapped, MapError> {
+        let colours = &SurfaceColours::of_materials(mesh);
+        map_mesh(PaintedMesh { mesh, colours }, config)
     }
 
     /// Number of blocks reached from the first through connections.
@@ -375,7 +446,7 @@ mod tests {
             tolerance: 0.0,
             ..MapConfig::default()
         };
-        let mapped = map_mesh(&mesh, &config).expect("a level");
+        let mapped = map_grey(&mesh, &config).expect("a level");
         assert!(mapped.level.blocks.len() <= 9);
         assert_eq!(reached(&mapped.level), mapped.level.blocks.len());
     }
@@ -395,7 +466,7 @@ mod tests {
             fit: Fit::Box,
             ..MapConfig::default()
         };
-        let level = map_mesh(&mesh, &config).expect("a level").level;
+        let level = map_grey(&mesh, &config).expect("a level").level;
         let (min, max) = level.blocks[0].warp.bounds();
         assert!(
             min.length() < 0.1 && max.distance(glam::DVec3::new(4.0, 3.0, 4.0)) < 0.1,
@@ -407,7 +478,36 @@ mod tests {
     fn meshes_without_rooms_have_no_grid() {
         let corners = vec![Vec3::ZERO, Vec3::X, Vec3::Z];
         let mesh = TriangleMesh::from_triangles(corners, vec![[0, 1, 2]]);
-        let grid = map_mesh(&mesh, &MapConfig::default());
+        let grid = map_grey(&mesh, &MapConfig::default());
         assert_eq!(grid.expect_err("no rooms"), MapError::NoFreeSpace);
+    }
+
+    #[test]
+    fn solids_and_cells_that_are_too_large_are_named() {
+        let mut statue = rooms(&[[0..1, 0..2, 0..1], [0..1, 2..3, 0..3]]);
+        statue.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        let front = MapConfig {
+            winding: Winding::Front,
+            ..MapConfig::default()
+        };
+        assert_eq!(
+            map_grey(&statue, &front).expect_err("solid"),
+            MapError::Solid
+        );
+        let room = rooms(&[[0..4, 0..3, 0..4]]);
+        let wide = MapConfig {
+            cell: Some(200.0),
+            ..MapConfig::default()
+        };
+        let error = map_grey(&room, &wide).expect_err("too large");
+        let MapError::CellTooLarge { expected, found } = error else {
+            panic!("expected that the cell is too large, found {error}");
+        };
+        assert!(
+            found == 200.0 && (expected - 15.0).abs() < 0.5,
+            "{expected}"
+        );
+        // What is said to be accepted is accepted.
+        assert_eq!(map(&room, expected).level.blocks.len(), 1);
     }
 }

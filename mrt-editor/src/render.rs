@@ -2,6 +2,7 @@
 
 pub mod camera;
 pub mod file;
+pub mod lamp;
 pub mod level_view;
 pub mod lit;
 pub mod picture;

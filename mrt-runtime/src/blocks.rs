@@ -7,6 +7,7 @@ pub use crate::level::block::{Block, Connection, Door, Opening};
 pub use crate::level::cells::CellsError;
 #[cfg(feature = "generator")]
 pub use crate::level::generator::maze;
+pub use crate::level::mesh_reading::{MeshReading, UpAxis};
 pub use crate::level::shape::{SHAPES, Shape};
 pub use crate::level::warp_transport::WarpTransport;
 pub use mrt_core::geometry::cube::{CubeRotation, Face};

@@ -8,6 +8,7 @@ pub mod wall;
 pub mod unit_from_world;
 pub mod mirrors;
 pub mod warp_transport;
+pub mod mesh_reading;
 pub mod block;
 pub mod cells;
 pub mod error;

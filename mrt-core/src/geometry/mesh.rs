@@ -176,6 +176,15 @@ pub fn check(mesh: &TriangleMesh) -> Result<(), MeshError> {
     Ok(())
 }
 
+/// Where the parts of a cleaned mesh come from, to take along what belongs to them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Kept {
+    /// Triangle of the mesh before, of each triangle; ascending.
+    pub triangles: Vec<u32>,
+    /// Vertex of the mesh before, of each vertex; ascending.
+    pub vertices: Vec<u32>,
+}
+
 /// A copy without triangles that have no area or a position that is not finite, and without unused
 /// vertices. The rest keeps its order, and all materials are kept.
 ///
@@ -185,57 +194,70 @@ pub fn check(mesh: &TriangleMesh) -> Result<(), MeshError> {
 /// # Errors
 /// Those of [`check`].
 pub fn clean(mesh: &TriangleMesh) -> Result<(TriangleMesh, MeshReport), MeshError> {
+    let (cleaned, report, _) = clean_and_trace(mesh)?;
+    Ok((cleaned, report))
+}
+
+/// As [`clean`]; also says which triangles and vertices were kept.
+///
+/// # Errors
+/// Those of [`check`].
+pub fn clean_and_trace(mesh: &TriangleMesh) -> Result<(TriangleMesh, MeshReport, Kept), MeshError> {
     check(mesh)?;
     let mut report = MeshReport::default();
+    let (kept, new_index) = choose_kept(mesh, &mut report);
+    let mut normals = None;
+    if let Some(given) = &mesh.normals {
+        let unit: Vec<Option<DVec3>> = kept
+            .vertices
+            .iter()
+            .map(|&v| given[v as usize].as_dvec3().try_normalize())
+            .collect();
+        report.invalid_normals = unit.iter().filter(|n| n.is_none()).count();
+        normals = unit.into_iter().map(|n| n.map(|n| n.as_vec3())).collect();
+    }
+    let of_vertices = kept.vertices.iter().map(|&v| v as usize);
+    let of_triangles = || kept.triangles.iter().map(|&t| t as usize);
+    let cleaned = TriangleMesh {
+        positions: of_vertices.map(|v| mesh.positions[v]).collect(),
+        triangles: of_triangles()
+            .map(|t| mesh.triangles[t].map(|v| new_index[v as usize]))
+            .collect(),
+        normals,
+        triangle_materials: of_triangles().map(|t| mesh.triangle_materials[t]).collect(),
+        materials: mesh.materials.clone(),
+    };
+    count_edges(&cleaned, &mut report);
+    Ok((cleaned, report, kept))
+}
+
+/// Which triangles and vertices [`clean`] keeps, and the new index of each vertex that is kept.
+fn choose_kept(mesh: &TriangleMesh, report: &mut MeshReport) -> (Kept, Vec<u32>) {
+    const UNUSED: u32 = u32::MAX;
     let finite: Vec<bool> = mesh.positions.iter().map(|p| p.is_finite()).collect();
     report.not_finite_vertices = finite.iter().filter(|&&f| !f).count();
-    const UNUSED: u32 = u32::MAX;
     let mut new_index = vec![UNUSED; mesh.positions.len()];
-    let mut kept = Vec::with_capacity(mesh.triangles.len());
+    let mut kept = Kept::default();
     for (triangle, vertices) in mesh.triangles.iter().enumerate() {
         if vertices.iter().any(|&v| !finite[v as usize]) {
             report.not_finite_triangles += 1;
         } else if is_degenerate(mesh.corners(triangle)) {
             report.degenerate_triangles += 1;
         } else {
-            kept.push(triangle);
+            kept.triangles.push(triangle as u32);
             for &vertex in vertices {
                 new_index[vertex as usize] = 0;
             }
         }
     }
-    let mut used = Vec::with_capacity(mesh.positions.len());
     for (vertex, index) in new_index.iter_mut().enumerate() {
         if *index != UNUSED {
-            *index = used.len() as u32;
-            used.push(vertex);
+            *index = kept.vertices.len() as u32;
+            kept.vertices.push(vertex as u32);
         }
     }
-    report.unused_vertices = mesh.positions.len() - used.len() - report.not_finite_vertices;
-    let mut normals = None;
-    if let Some(given) = &mesh.normals {
-        let unit: Vec<Option<DVec3>> = used
-            .iter()
-            .map(|&v| given[v].as_dvec3().try_normalize())
-            .collect();
-        report.invalid_normals = unit.iter().filter(|n| n.is_none()).count();
-        normals = unit.into_iter().map(|n| n.map(|n| n.as_vec3())).collect();
-    }
-    let cleaned = TriangleMesh {
-        positions: used.iter().map(|&v| mesh.positions[v]).collect(),
-        triangles: kept
-            .iter()
-            .map(|&t| mesh.triangles[t].map(|v| new_index[v as usize]))
-            .collect(),
-        normals,
-        triangle_materials: kept.iter().map(|&t| mesh.triangle_materials[t]).collect(),
-        materials: mesh.materials.clone(),
-    };
-    for triangle_count in edge_triangle_counts(&cleaned) {
-        report.boundary_edges += usize::from(triangle_count == 1);
-        report.non_manifold_edges += usize::from(triangle_count > 2);
-    }
-    Ok((cleaned, report))
+    report.unused_vertices = finite.len() - kept.vertices.len() - report.not_finite_vertices;
+    (kept, new_index)
 }
 
 /// The unit normal of each triangle; zero for triangles without area.
@@ -406,8 +428,8 @@ fn first_vertex_at_each_place(mesh: &TriangleMesh) -> Vec<u32> {
     first
 }
 
-/// Number of triangles of each edge, in no particular order of edges.
-fn edge_triangle_counts(mesh: &TriangleMesh) -> Vec<usize> {
+/// Counts the edges at which the surface ends or branches.
+fn count_edges(mesh: &TriangleMesh, report: &mut MeshReport) {
     let place = first_vertex_at_each_place(mesh);
     let mut edges = Vec::with_capacity(mesh.triangles.len() * 3);
     for vertices in &mesh.triangles {
@@ -415,5 +437,8 @@ fn edge_triangle_counts(mesh: &TriangleMesh) -> Vec<usize> {
         edges.extend([[a, b], [b, c], [c, a]].map(|[v, w]| [v.min(w), v.max(w)]));
     }
     edges.sort_unstable();
-    edges.chunk_by(|a, b| a == b).map(<[_]>::len).collect()
+    for triangles in edges.chunk_by(|a, b| a == b) {
+        report.boundary_edges += usize::from(triangles.len() == 1);
+        report.non_manifold_edges += usize::from(triangles.len() > 2);
+    }
 }

@@ -12,26 +12,29 @@ mod warnings;
 pub use args::{Exposure, LightArg, LightArgs, Shadows, ViewArg};
 pub use error::LightCommandError;
 
+use crate::cli::import_args::warn_of_import;
 use crate::cli::output::{folder_of, is_same_place, print_report};
 use crate::document::level_file::read_level;
-use crate::fit_level::mesh_samples::sample_mesh;
-use crate::fit_level::paint::coverage;
-use crate::import::read_scene;
+use crate::fit_level::mesh_samples::{MeshSample, sample_mesh};
+use crate::fit_level::paint::{PaintedMesh, coverage, distances, material_albedos};
+use crate::import::report::ImportReport;
+use crate::import::{ImportedScene, read_scene};
 use crate::render::lit::LitScene;
-use crate::render::placement::Surroundings;
+use crate::render::placement::{Surroundings, VIEW_ANGLE_RAD};
 use mrt_core::geometry::bvh::Bvh;
-use mrt_core::geometry::mesh::{TriangleMesh, corner_normals};
+use mrt_core::geometry::mesh::corner_normals;
 use mrt_runtime::Level;
 use mrt_runtime::low_level::output::receiver::{ReceiverMap, unwrap_mesh};
-use report::{Report, lamp_row};
+use places::{Lamps, Place};
+use report::{Report, lamp_rows, sun_rows};
 use std::time::Instant;
-use view::View;
+use view::{View, level_origin};
 
 /// Faces that meet at less than this angle look smooth, radians.
 const CREASE_ANGLE_RAD: f64 = 0.7;
 
-/// Points on the mesh at which its level is looked for.
-const COVERAGE_POINTS: usize = 4096;
+/// Points on the mesh at which its level is looked for and its colours are averaged.
+const SURFACE_POINTS: usize = 16_384;
 
 /// With less of its area in or near a block, a mesh does not belong to the level. Levels of `mrt map` hold 70 % and more.
 const LEAST_COVERAGE: f64 = 0.1;
@@ -43,46 +46,103 @@ const LEAST_COVERAGE: f64 = 0.1;
 pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     let start = Instant::now();
     check_output(args)?;
-    let imported = read_scene(&args.scene, &args.import.config())?;
-    let mesh = &imported.mesh;
     let level = read_level(&args.level)?;
+    let mut imported = read_scene(&args.scene, &args.import.config_for(level.mesh.as_ref())?)?;
+    warn_of_import(&imported.report);
     warnings::warn_of_warps(&level);
+    let points = sample_mesh(&imported.mesh, SURFACE_POINTS);
+    give_materials_their_means(&mut imported, &points);
+    let mesh = &imported.mesh;
     let bvh = Bvh::build(mesh);
     let surroundings = Surroundings::new(mesh, &bvh, &level);
     let receivers = receivers(&level, &bvh);
-    check_coverage(args, &level, &receivers, mesh)?;
-    let lamps = places::lamps(args, &level, &receivers, &surroundings)?;
-    let solved = solve::solve(args, &level, &lamps, &bvh)?;
+    check_coverage(args, &level, &receivers, &points)?;
+    let place = Place {
+        level: &level,
+        receivers: &receivers,
+        surroundings: &surroundings,
+    };
+    let lamps = places::lamps(args, &imported.lights, place)?;
+    let solved = solve::solve(args, &level, &lamps.lights, &surroundings)?;
     let scene = solved.frame.scene();
     let lit = LitScene {
         mesh,
+        colours: &imported.colours,
         corner_normals: &corner_normals(mesh, CREASE_ANGLE_RAD),
         bvh: &bvh,
         receivers: &receivers,
         atlas: &scene.atlas,
         lightmap: solved.frame.lightmap().pixels(),
-        lamps: &lamps,
+        lamps: &lamps.lights,
         restart: surroundings.restart(),
+        reach: surroundings.reach(),
+        pixel_angle: VIEW_ANGLE_RAD / args.size[1] as f32,
+        is_reversed: surroundings.is_reversed,
         hides_outside: false,
     };
     let views = view::views(args, &lit, &level, &surroundings)?;
     let unwrapped = unwrap_mesh(mesh, &receivers);
-    output::write(&args.out, &views, &lit, &unwrapped)?;
+    let files = output::Unwrapped {
+        triangles: &unwrapped,
+        origin: level_origin(&level),
+    };
+    output::write(&args.out, &views, &lit, &files)?;
+    let lit = Lit {
+        level: &level,
+        lamps: &lamps,
+        solved: &solved,
+        views: &views,
+    };
     let report = Report {
-        mesh: imported.report,
-        blocks: level.blocks.len(),
-        connections: level.connections.len(),
-        lights: lamps.iter().map(lamp_row).collect(),
-        passes: solved.passes,
-        dictionary_seconds: solved.dictionary_seconds,
-        assemble_seconds: solved.assemble_seconds,
-        frame_milliseconds: solved.frame_milliseconds,
-        lightmap: [scene.atlas.width, scene.atlas.height],
         lightmap_triangles: unwrapped.len(),
-        views: views.iter().map(View::report).collect(),
         seconds: start.elapsed().as_secs_f64(),
+        ..lit.report(imported.report.clone())
     };
     Ok(print_report(&report, args.json, Report::print)?)
+}
+
+/// What a report tells about.
+struct Lit<'a> {
+    level: &'a Level,
+    lamps: &'a Lamps,
+    solved: &'a solve::Solved,
+    views: &'a [View],
+}
+
+impl Lit<'_> {
+    /// Without the seconds in all and the number of triangles with coordinates.
+    fn report(&self, mesh: ImportReport) -> Report {
+        let atlas = &self.solved.frame.scene().atlas;
+        Report {
+            mesh,
+            blocks: self.level.blocks.len(),
+            connections: self.level.connections.len(),
+            lights: lamp_rows(&self.lamps.lights, level_origin(self.level)),
+            suns: sun_rows(&self.lamps.lights),
+            lights_of_mesh: self.lamps.of_mesh,
+            emissive_walls: places::emissive_walls(self.level),
+            passes: self.solved.passes,
+            dictionary_seconds: self.solved.dictionary_seconds,
+            assemble_seconds: self.solved.assemble_seconds,
+            frame_milliseconds: self.solved.frame_milliseconds,
+            lightmap: [atlas.width, atlas.height],
+            lightmap_triangles: 0,
+            views: self.views.iter().map(View::report).collect(),
+            seconds: 0.0,
+        }
+    }
+}
+
+/// The mesh that is written has one colour a material.
+fn give_materials_their_means(scene: &mut ImportedScene, points: &[MeshSample]) {
+    let painted = PaintedMesh {
+        mesh: &scene.mesh,
+        colours: &scene.colours,
+    };
+    let albedos = material_albedos(painted, points);
+    for (material, albedo) in scene.mesh.materials.iter_mut().zip(albedos) {
+        material.albedo = albedo;
+    }
 }
 
 /// The output folder must hold neither the mesh nor the level.
@@ -109,9 +169,9 @@ fn check_coverage(
     args: &LightArgs,
     level: &Level,
     receivers: &ReceiverMap,
-    mesh: &TriangleMesh,
+    points: &[MeshSample],
 ) -> Result<(), LightCommandError> {
-    let found = coverage(level, receivers, &sample_mesh(mesh, COVERAGE_POINTS)).near;
+    let found = coverage(points, &distances(level, receivers, points)).near;
     if found < LEAST_COVERAGE {
         return Err(LightCommandError::OtherMesh {
             path: args.level.clone(),

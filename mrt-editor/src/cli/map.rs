@@ -1,10 +1,10 @@
 //! `mrt map`: writes a level around a mesh.
 
-use crate::cli::import_args::{ImportArgs, import_hint, print_import};
+use crate::cli::import_args::{ImportArgs, import_hint, print_import, warn_of_import};
 use crate::cli::output::{ReportError, is_same_place, print_report, print_row};
 use crate::document::level_file::{LevelFileError, write_level};
 use crate::fit_level::config::{Fit, MapConfig, MapError};
-use crate::fit_level::paint::Coverage;
+use crate::fit_level::paint::{Coverage, PaintReport, PaintedMesh};
 use crate::fit_level::voxels::Winding;
 use crate::fit_level::{Mapped, map_mesh};
 use crate::import::error::ImportError;
@@ -18,7 +18,7 @@ use std::time::Instant;
 /// Maps a mesh to a level of connected blocks.
 #[derive(Clone, Debug, clap::Args)]
 pub struct MapArgs {
-    /// Mesh to map: .obj or .glb.
+    /// Mesh to map: .obj, .glb or .gltf.
     #[arg(long)]
     pub scene: PathBuf,
     /// Level file to write.
@@ -90,6 +90,10 @@ fn hint(error: &MapError) -> &'static str {
         MapError::NoFreeSpace => {
             "; try --winding both, or --fit box for one block around everything"
         }
+        MapError::Solid => {
+            "; if these are rooms seen from behind, try --winding back, or --winding both"
+        }
+        MapError::CellTooLarge { .. } | MapError::CellTooSmall { .. } => " (see --cell)",
         MapError::TooDense => " (try a larger --cell)",
         _ => "",
     }
@@ -107,6 +111,7 @@ struct Report {
     closed_passages: usize,
     faces_reversed: bool,
     area_share: Coverage,
+    paint: PaintReport,
     seconds: f64,
 }
 
@@ -122,7 +127,13 @@ pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
     }
     let start = Instant::now();
     let scene = read_scene(&args.scene, &args.import.config())?;
-    let mapped = map_mesh(&scene.mesh, &config(args))?;
+    warn_of_import(&scene.report);
+    let painted = PaintedMesh {
+        mesh: &scene.mesh,
+        colours: &scene.colours,
+    };
+    let mut mapped = map_mesh(painted, &config(args))?;
+    mapped.level.mesh = Some(scene.reading);
     write_level(&args.out, &mapped.level)?;
     let report = Report::new(scene.report, &mapped, start);
     Ok(print_report(&report, args.json, Report::print)?)
@@ -157,6 +168,7 @@ impl Report {
             closed_passages: mapped.closed_passages,
             faces_reversed: mapped.is_reversed,
             area_share: mapped.coverage,
+            paint: mapped.paint,
             seconds: start.elapsed().as_secs_f64(),
         }
     }
@@ -173,11 +185,26 @@ impl Report {
         print_row("dropped misfits", self.dropped_misfits);
         print_row("closed passages", self.closed_passages);
         if self.faces_reversed {
-            print_row("faces", "turned away from the rooms; taken as reversed");
+            print_row(
+                "faces",
+                "turned away from the rooms; taken as reversed (a solid, such as a statue, has no rooms)",
+            );
         }
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
         print_row("area inside blocks", percent(self.area_share.inside));
         print_row("area in or near", percent(self.area_share.near));
+        let moved = self.paint.moved_walls;
+        print_row("albedos of walls", format!("{moved} moved into 0.05..0.9"));
+        let watts = |[r, g, b]: [f64; 3]| format!("({r:.3}, {g:.3}, {b:.3}) W");
+        if self.mesh.emissive_materials > 0 {
+            let walls = self.paint.emissive_walls;
+            let emitted = watts(self.paint.emitted_w);
+            print_row("emission", format!("{emitted} from {walls} walls"));
+        }
+        if self.paint.lost_emission_w != [0.0; 3] {
+            let lost = watts(self.paint.lost_emission_w);
+            print_row("  left out", format!("{lost} too far from every block"));
+        }
         print_row("seconds", format!("{:.2}", self.seconds));
     }
 }

@@ -44,5 +44,6 @@ pub fn fit_box(shape: &'static Shape, points: &[Vec3]) -> Level {
         )],
         connections: Vec::new(),
         doors: Vec::new(),
+        mesh: None,
     }
 }

@@ -56,6 +56,19 @@ pub enum MapError {
         "the scene encloses no free space: found no point with a floor below and faces towards it on most sides"
     )]
     NoFreeSpace,
+    /// The mesh is closed and all its faces look outwards.
+    #[error(
+        "the scene is solid: its faces look outwards and enclose no free space; expected rooms, whose faces look inwards"
+    )]
+    Solid,
+    /// Rooms are lost between voxels as coarse as the cells ask for.
+    #[error("cells of {found} m; expected at most {expected:.3} m for rooms of this height")]
+    CellTooLarge {
+        /// Largest accepted, metres.
+        expected: f64,
+        /// The size given.
+        found: f64,
+    },
     /// Too many triangles lie over one another.
     #[error(
         "the scene's triangles overlap too much: found over {MOST_CROSSINGS} crossings of voxel rows; expected a level of \

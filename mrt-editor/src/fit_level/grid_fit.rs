@@ -281,6 +281,7 @@ fn assemble_level(
         blocks,
         connections,
         doors: Vec::new(),
+        mesh: None,
     }
 }
 

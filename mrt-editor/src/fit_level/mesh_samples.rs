@@ -1,6 +1,6 @@
 //! Points spread evenly over a mesh's area.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use mrt_core::geometry::mesh::{TriangleMesh, areas, face_normals};
 use mrt_core::lighting::sampling::hammersley_point;
 
@@ -13,6 +13,8 @@ pub struct MeshSample {
     pub normal: Vec3,
     /// Which triangle it lies on.
     pub triangle: usize,
+    /// Weights of the triangle's second and third corner.
+    pub barycentric: Vec2,
     /// The area that it stands for, square metres.
     pub area: f64,
 }
@@ -38,6 +40,7 @@ pub fn sample_mesh(mesh: &TriangleMesh, count: usize) -> Vec<MeshSample> {
                 position: a + (b - a) * unit.x as f32 + (c - a) * unit.y as f32,
                 normal,
                 triangle,
+                barycentric: unit.as_vec2(),
                 area: area / f64::from(share),
             });
         }

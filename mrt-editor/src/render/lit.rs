@@ -1,9 +1,12 @@
-//! Colours of a mesh under sphere lights, with indirect light from a lightmap.
+//! Colours of a mesh under lamps, with indirect light from a lightmap.
 
-use glam::Vec3;
+use super::lamp::{position, unshadowed, way_to};
+use crate::import::surface_colours::{SurfaceColours, SurfacePoint};
+use glam::{Vec2, Vec3};
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::TriangleMesh;
-use mrt_core::lighting::sampling::{hash, sobol_point, sphere_from_square, square_from_unit};
+use mrt_core::lighting::sampling::{hash, sobol_point};
+use mrt_runtime::Light;
 use mrt_runtime::low_level::output::lightmap_atlas::LightmapAtlas;
 use mrt_runtime::low_level::output::receiver::{Blend, ReceiverMap};
 use std::f32::consts::PI;
@@ -17,22 +20,16 @@ const SHADOW_RAYS: u32 = 16;
 /// Lamps below this share of all light that a point would get without shadows are left out.
 const NEGLIGIBLE_SHARE: f32 = 2e-3;
 
-/// A light that shines from a sphere; irradiance is `intensity cos θ / max(d², radius²)`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lamp {
-    /// Centre, metres.
-    pub position: Vec3,
-    /// Radius, metres.
-    pub radius: f32,
-    /// Radiant intensity per colour channel, W/sr.
-    pub intensity: Vec3,
-}
+/// Images seen at a flatter angle than this are averaged as at this cosine.
+const LEAST_COSINE: f32 = 0.1;
 
 /// Everything that a ray needs to find its colour.
 #[derive(Clone, Copy)]
 pub struct LitScene<'a> {
     /// The mesh.
     pub mesh: &'a TriangleMesh,
+    /// The colours of its points.
+    pub colours: &'a SurfaceColours,
     /// Unit normals of the triangles' corners, for shading.
     pub corner_normals: &'a [[Vec3; 3]],
     /// The mesh's tree.
@@ -44,9 +41,15 @@ pub struct LitScene<'a> {
     /// Indirect irradiance, W/m².
     pub lightmap: &'a [[f32; 3]],
     /// What direct light comes from.
-    pub lamps: &'a [Lamp],
+    pub lamps: &'a [Light],
     /// Distance from surfaces at which rays start, metres.
     pub restart: f32,
+    /// Distance beyond which the mesh has no surfaces, metres.
+    pub reach: f32,
+    /// Angle between neighbouring pixels, radians: images on surfaces are averaged over a pixel.
+    pub pixel_angle: f32,
+    /// True if rooms see the backs of the faces.
+    pub is_reversed: bool,
     /// For views from outside: surfaces are invisible from behind, and where no light of the level gets to, such as roofs,
     /// so that one looks into the rooms.
     pub hides_outside: bool,
@@ -55,7 +58,7 @@ pub struct LitScene<'a> {
 /// What a ray sees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Colours {
-    /// Radiance by direct light.
+    /// Radiance by light straight from lamps, and that of surfaces which shine.
     pub direct: Vec3,
     /// Radiance by indirect light.
     pub indirect: Vec3,
@@ -68,6 +71,8 @@ struct Surface {
     /// Smoothed, towards the viewer.
     normal: Vec3,
     albedo: Vec3,
+    /// Radiance that it sends out by itself.
+    emission: Vec3,
 }
 
 impl LitScene<'_> {
@@ -78,7 +83,7 @@ impl LitScene<'_> {
         };
         let reflectance = surface.albedo / PI;
         Colours {
-            direct: reflectance * self.direct(&surface),
+            direct: surface.emission + reflectance * self.direct(&surface),
             indirect: reflectance * self.indirect(&surface),
         }
     }
@@ -99,12 +104,25 @@ impl LitScene<'_> {
             let towards_viewer = if is_back { -1.0 } else { 1.0 };
             let [na, nb, nc] = self.corner_normals[triangle];
             let smooth = na * (1.0 - hit.u - hit.v) + nb * hit.u + nc * hit.v;
-            let material = self.mesh.triangle_materials[triangle] as usize;
+            let across = hit.t * self.pixel_angle;
+            let at = SurfacePoint {
+                triangle,
+                barycentric: Vec2::new(hit.u, hit.v),
+                area: across * across / flat.dot(direction).abs().max(LEAST_COSINE),
+            };
+            let most = self.colours.albedo_range()[1];
+            let emission = self.colours.emission(self.mesh, triangle);
             return Some(Surface {
                 position,
                 flat_normal: flat * towards_viewer,
                 normal: smooth.try_normalize().unwrap_or(flat) * towards_viewer,
-                albedo: self.mesh.materials[material].albedo,
+                // Walls of the level are no brighter than this, so that light dies out between them.
+                albedo: self.colours.albedo(self.mesh, &at).min(Vec3::splat(most)),
+                emission: if is_back == self.is_reversed {
+                    emission
+                } else {
+                    Vec3::ZERO
+                },
             });
         }
         None
@@ -118,14 +136,12 @@ impl LitScene<'_> {
     /// Irradiance straight from the lamps, with soft shadows.
     fn direct(&self, surface: &Surface) -> Vec3 {
         let seed = hash(surface.position.x.to_bits(), surface.position.z.to_bits());
-        let unshadowed = |lamp: &Lamp| {
-            let offset = lamp.position - surface.position;
-            let squared = offset.length_squared().max(lamp.radius * lamp.radius);
-            let cosine = surface.normal.dot(offset.normalize_or_zero());
-            if cosine <= 0.0 || surface.flat_normal.dot(offset) <= 0.0 || squared == 0.0 {
+        let unshadowed = |lamp: &Light| {
+            let flat = unshadowed(lamp, surface.position, surface.flat_normal);
+            if flat == Vec3::ZERO {
                 return Vec3::ZERO;
             }
-            lamp.intensity * (cosine / squared)
+            unshadowed(lamp, surface.position, surface.normal)
         };
         let most: Vec3 = self.lamps.iter().map(unshadowed).sum();
         let mut sum = Vec3::ZERO;
@@ -140,13 +156,11 @@ impl LitScene<'_> {
     }
 
     /// The share of a lamp that is seen: by a few rays where they agree, by more in penumbras.
-    fn visible_share(&self, surface: &Surface, lamp: &Lamp, seed: u32) -> f32 {
-        let distance = lamp.position.distance(surface.position);
+    fn visible_share(&self, surface: &Surface, lamp: &Light, seed: u32) -> f32 {
+        let distance = position(lamp).map_or(self.reach, |lamp| lamp.distance(surface.position));
         let start = surface.position + surface.flat_normal * self.restart.min(1e-2 * distance);
         let is_visible = |k: u32| {
-            let square = square_from_unit(sobol_point(k, seed));
-            let on_lamp = sphere_from_square(square).as_vec3() * lamp.radius;
-            let towards = lamp.position + on_lamp - start;
+            let towards = way_to(lamp, start, sobol_point(k, seed), self.reach);
             u32::from(!self.bvh.is_occluded(start, towards, 1.0))
         };
         let first: u32 = (0..FIRST_SHADOW_RAYS).map(is_visible).sum();

@@ -85,6 +85,11 @@ impl<'a> Surroundings<'a> {
         outlook
     }
 
+    /// Distance beyond which there are no surfaces, metres.
+    pub fn reach(&self) -> f32 {
+        size(self.mesh)
+    }
+
     /// Distance from surfaces at which to start rays, metres: 1e-5 of the mesh's size.
     pub fn restart(&self) -> f32 {
         1e-5 * size(self.mesh)

@@ -96,7 +96,8 @@ pub fn bad_meshes() -> Vec<(&'static str, Vec<u8>)> {
         ("no-faces.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec()),
         (
             "truncated.obj",
-            ROOM_OBJ.as_bytes()[..ROOM_OBJ.len() - 6].to_vec(),
+            // The last vertex lacks a coordinate.
+            ROOM_OBJ.as_bytes()[..61].to_vec(),
         ),
         (
             "no-such-vertex.obj",

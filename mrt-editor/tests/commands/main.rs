@@ -3,6 +3,9 @@
 mod accuracy;
 mod adapt;
 mod bake;
+mod cases_colour;
+mod cases_gltf;
+mod cases_obj;
 mod common;
 mod demo;
 mod info;

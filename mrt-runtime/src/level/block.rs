@@ -1,5 +1,6 @@
 //! What a designer edits: warped blocks and the openings through which they are joined.
 
+use crate::level::mesh_reading::MeshReading;
 use crate::level::shape::{Aperture, Shape};
 use crate::level::warp_transport::WarpTransport;
 use glam::{DVec3, Vec3};
@@ -19,6 +20,8 @@ pub struct Level {
     pub connections: Vec<Connection>,
     /// Connections that can be closed while the game runs; frames name a door by its position in this list.
     pub doors: Vec<Door>,
+    /// How the mesh that the level was made for is read; `None` if nothing is known of a mesh.
+    pub mesh: Option<MeshReading>,
 }
 
 /// A connection that can be closed at run time, partly or wholly.

@@ -12,7 +12,7 @@ impl Level {
     /// Checks everything that assembly and the frame rely on.
     ///
     /// # Errors
-    /// The first [`LevelError`] found: of blocks, then of connections, then of doors, then of overlaps.
+    /// The first [`LevelError`] found: of blocks, of the mesh, of connections, then of doors, then of overlaps.
     pub fn check(&self) -> Result<(), LevelError> {
         let count = self.blocks.len();
         if count == 0 {
@@ -27,6 +27,9 @@ impl Level {
         for (index, block) in self.blocks.iter().enumerate() {
             check_warp(index, block)?;
             check_colours(index, block)?;
+        }
+        if let Some(mesh) = &self.mesh {
+            mesh.check()?;
         }
         self.check_connections()?;
         self.check_doors()?;

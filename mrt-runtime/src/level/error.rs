@@ -1,7 +1,7 @@
 //! Why a level is refused, and the limits that it must keep.
 
 use crate::light::limits::MAX_LIGHT_VALUE;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use mrt_core::geometry::cube::Face;
 use mrt_core::geometry::hexahedron::HexahedronError;
 
@@ -58,6 +58,18 @@ pub enum LevelError {
         face: Face,
         /// The emission there.
         found: Vec3,
+    },
+    /// The scale of the level's mesh is not a positive number.
+    #[error("the level's mesh has {found} metres per unit; expected a positive number")]
+    MeshScale {
+        /// The scale there.
+        found: f64,
+    },
+    /// The origin in the level's mesh is NaN or infinite.
+    #[error("the level's mesh has its origin at {found} m; expected three finite numbers")]
+    MeshOrigin {
+        /// The origin there.
+        found: DVec3,
     },
     /// A door names no connection or one that has a door already, or its value is not in [0, 1].
     #[error(

@@ -6,6 +6,13 @@
 //! connections = [[0, "+x", 1, "-x"]]
 //! doors = [[0, 1.0]]           # connection 0 can be closed; at first all its light passes
 //!
+//! [mesh]                       # how the mesh that the level was made for is read; may be missing
+//! scale = 0.05                 # metres per unit of its file
+//! up = "z"                     # or "y"
+//! origin = [2000.0, 0.0, 0.0]  # metres from the mesh's origin to the level's, if they differ
+//! skip_materials = ["fog*"]    # left out; only_materials names those that are read
+//! keep_tool_materials = true   # helper faces of level editors are read too
+//!
 //! [[block]]
 //! shape = "dead_end"
 //! cell = [0, 0, 0]             # or box = [[0, 0, 0], [2, 1, 1]], or corners = [eight points]
@@ -23,6 +30,7 @@
 
 use crate::level::block::{Block, Connection, Door, Level, MAX_BLOCKS, Opening};
 use crate::level::error::LevelError;
+use crate::level::mesh_reading::{MeshReading, UpAxis};
 use crate::level::shape::{SHAPES, Shape};
 use crate::level::warp_transport::WarpTransport;
 use glam::{DVec3, Vec3};
@@ -104,6 +112,12 @@ pub enum LevelTextError {
         /// The text given.
         found: String,
     },
+    /// The mesh has an upward axis that is neither y nor z.
+    #[error("mesh: up `{found}`; expected y or z")]
+    UnknownAxis {
+        /// The text given.
+        found: String,
+    },
     /// A name is not that of a face.
     #[error("{place}: face `{found}`; expected -x, +x, -y, +y, -z or +z")]
     UnknownFace {
@@ -134,8 +148,30 @@ struct LevelText {
     connections: Vec<(usize, String, usize, String)>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     doors: Vec<(usize, f32)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    mesh: Option<MeshText>,
     #[serde(default, rename = "block")]
     blocks: Vec<BlockText>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MeshText {
+    scale: f64,
+    up: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    origin: Option<[f64; 3]>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    skip_materials: Vec<String>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    only_materials: Vec<String>,
+    #[serde(default, skip_serializing_if = "is_false")]
+    keep_tool_materials: bool,
+}
+
+/// Tells serde when to leave out a flag.
+fn is_false(flag: &bool) -> bool {
+    !flag
 }
 
 #[derive(Serialize, Deserialize)]
@@ -215,6 +251,7 @@ impl Level {
             blocks,
             connections,
             doors,
+            mesh: text.mesh.map(read_mesh).transpose()?,
         };
         level.check()?;
         Ok(level)
@@ -241,6 +278,7 @@ impl Level {
                 .iter()
                 .map(|door| (door.connection, door.value))
                 .collect(),
+            mesh: self.mesh.as_ref().map(write_mesh),
             blocks: self.blocks.iter().map(write_block).collect(),
         };
         toml::to_string(&text).map_err(|error| LevelTextError::Malformed(error.to_string()))
@@ -253,6 +291,29 @@ fn one_line(text: &str, error: &toml::de::Error) -> String {
     match error.span().and_then(|span| text.get(..span.start)) {
         Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
         None => message,
+    }
+}
+
+fn read_mesh(text: MeshText) -> Result<MeshReading, LevelTextError> {
+    let up = UpAxis::from_name(&text.up);
+    Ok(MeshReading {
+        scale: text.scale,
+        up: up.ok_or(LevelTextError::UnknownAxis { found: text.up })?,
+        origin: text.origin.map_or(DVec3::ZERO, DVec3::from_array),
+        skip_materials: text.skip_materials,
+        only_materials: text.only_materials,
+        keeps_tool_materials: text.keep_tool_materials,
+    })
+}
+
+fn write_mesh(mesh: &MeshReading) -> MeshText {
+    MeshText {
+        scale: mesh.scale,
+        up: mesh.up.name().to_owned(),
+        origin: (mesh.origin != DVec3::ZERO).then(|| mesh.origin.to_array()),
+        skip_materials: mesh.skip_materials.clone(),
+        only_materials: mesh.only_materials.clone(),
+        keep_tool_materials: mesh.keeps_tool_materials,
     }
 }
 
@@ -371,6 +432,14 @@ mod tests {
         level.blocks[1].transport = WarpTransport::Regathered;
         level.blocks[2].transport = WarpTransport::Rebuilt;
         level.blocks[2].warp.corners[7] += DVec3::new(0.1, 0.2, 1.0 / 3.0);
+        level.mesh = Some(MeshReading {
+            scale: 0.1,
+            up: UpAxis::Z,
+            origin: DVec3::new(1e7, 0.0, -3.0),
+            skip_materials: vec!["a \"b\"*".to_owned()],
+            only_materials: Vec::new(),
+            keeps_tool_materials: true,
+        });
         level
     }
 
@@ -433,5 +502,37 @@ mod tests {
             Level::from_text("format = \"mrt-level\"\nversion = 1"),
             Err(LevelTextError::Level(LevelError::Empty))
         );
+    }
+
+    #[test]
+    fn faults_of_the_mesh_have_their_errors() {
+        let good = sample().to_text().expect("writes");
+        let fault = |from: &str, to: &str| {
+            assert!(good.contains(from), "{from} is not in the text");
+            Level::from_text(&good.replacen(from, to, 1)).expect_err("refused")
+        };
+        assert_eq!(
+            fault("up = \"z\"", "up = \"x\""),
+            LevelTextError::UnknownAxis {
+                found: "x".to_owned()
+            }
+        );
+        assert_eq!(
+            fault("scale = 0.1", "scale = 0.0"),
+            LevelTextError::Level(LevelError::MeshScale { found: 0.0 })
+        );
+        assert!(matches!(
+            fault("origin = [1", "origin = [inf, 1"),
+            LevelTextError::Malformed(_)
+        ));
+        assert!(matches!(
+            fault("origin = [10000000.0", "origin = [inf"),
+            LevelTextError::Level(LevelError::MeshOrigin { .. })
+        ));
+        // A level of before has no mesh.
+        let start = good.find("[mesh]").expect("a mesh");
+        let end = good.find("[[block]]").expect("a block");
+        let level = Level::from_text(&[&good[..start], &good[end..]].concat()).expect("reads");
+        assert_eq!(level.mesh, None);
     }
 }

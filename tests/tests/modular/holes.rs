@@ -54,6 +54,7 @@ fn level(hole: Hole, albedo: f32) -> Level {
         ],
         connections: vec![connected(0, Face::PosX, 1), connected(1, Face::PosX, 2)],
         doors: Vec::new(),
+        mesh: None,
     }
 }
 

@@ -49,7 +49,18 @@ fn every_kind_of_fault_is_dropped_and_counted() {
     mesh.triangles
         .extend([[1, 2, 9], [10, 2, 3], [4, 4, 5], [1, 11, 12], [1, 2, 8]]);
     mesh.triangle_materials.resize(17, 0);
-    let (cleaned, report) = clean(&mesh).unwrap();
+    let (cleaned, report, kept) = clean_and_trace(&mesh).unwrap();
+    let position = |&v: &u32| mesh.positions[v as usize];
+    assert!(
+        kept.vertices
+            .iter()
+            .map(position)
+            .eq(cleaned.positions.iter().copied())
+    );
+    for (triangle, &source) in kept.triangles.iter().enumerate() {
+        assert_eq!(cleaned.corners(triangle), mesh.corners(source as usize));
+    }
+    assert_eq!(kept.triangles.len(), cleaned.triangles.len());
     let expected = MeshReport {
         not_finite_vertices: 2,
         not_finite_triangles: 2,

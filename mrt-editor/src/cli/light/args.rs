@@ -1,7 +1,7 @@
 //! Flags of `mrt light`.
 
 use crate::cli::import_args::ImportArgs;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -11,7 +11,7 @@ const MOST_PIXELS_A_SIDE: usize = 16_384;
 /// Lights a real mesh through its blocks: pictures, the lightmap, and the mesh with its coordinates.
 #[derive(Clone, Debug, clap::Args)]
 pub struct LightArgs {
-    /// Mesh to light: .obj or .glb.
+    /// Mesh to light: .obj, .glb or .gltf.
     #[arg(long)]
     pub scene: PathBuf,
     /// Level around the mesh, as `map` writes it.
@@ -20,8 +20,8 @@ pub struct LightArgs {
     /// Folder for the pictures; made if missing.
     #[arg(long)]
     pub out: PathBuf,
-    /// Light: x,y,z,intensity or x,y,z,intensity,r,g,b (metres, W/sr); may be repeated [default: in the
-    /// largest blocks].
+    /// Light: x,y,z,intensity or x,y,z,intensity,r,g,b (metres, W/sr); may be repeated [default: the mesh's
+    /// lamps; without any, and if nothing in the level shines, a few in the largest blocks].
     #[arg(long, allow_hyphen_values = true)]
     pub light: Vec<LightArg>,
     /// Radius of the lights, metres [default: a tenth of the block's width].
@@ -66,8 +66,8 @@ pub type PictureSize = [usize; 2];
 /// A light on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightArg {
-    /// Metres.
-    pub position: Vec3,
+    /// Metres, in the mesh's coordinates.
+    pub position: DVec3,
     /// W/sr.
     pub intensity: f32,
     /// Factor per channel.
@@ -77,10 +77,10 @@ pub struct LightArg {
 /// A camera on the command line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewArg {
-    /// Where it stands, metres.
-    pub from: Vec3,
+    /// Where it stands, metres, in the mesh's coordinates.
+    pub from: DVec3,
     /// What it looks at, metres.
-    pub to: Vec3,
+    pub to: DVec3,
 }
 
 /// How bright the pictures are.
@@ -108,14 +108,14 @@ impl FromStr for LightArg {
         let expected =
             || format!("found `{text}`; expected x,y,z,intensity or x,y,z,intensity,r,g,b");
         let (position, intensity, colour) = match *numbers(text).ok_or_else(expected)? {
-            [x, y, z, intensity] => (Vec3::new(x, y, z), intensity, Vec3::ONE),
-            [x, y, z, intensity, r, g, b] => (Vec3::new(x, y, z), intensity, Vec3::new(r, g, b)),
+            [x, y, z, intensity] => (DVec3::new(x, y, z), intensity, DVec3::ONE),
+            [x, y, z, intensity, r, g, b] => (DVec3::new(x, y, z), intensity, DVec3::new(r, g, b)),
             _ => return Err(expected()),
         };
         Ok(Self {
             position,
-            intensity,
-            colour,
+            intensity: intensity as f32,
+            colour: colour.as_vec3(),
         })
     }
 }
@@ -127,7 +127,7 @@ impl FromStr for ViewArg {
         let expected = || format!("found `{text}`; expected x,y,z;x,y,z");
         let (from, to) = text.split_once(';').ok_or_else(expected)?;
         let point = |text: &str| match *numbers(text)? {
-            [x, y, z] => Some(Vec3::new(x, y, z)),
+            [x, y, z] => Some(DVec3::new(x, y, z)),
             _ => None,
         };
         Ok(Self {
@@ -151,7 +151,7 @@ impl FromStr for Exposure {
     }
 }
 
-fn numbers(text: &str) -> Option<Vec<f32>> {
+fn numbers(text: &str) -> Option<Vec<f64>> {
     text.split(',')
         .map(|word| word.trim().parse().ok())
         .collect()
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn flags_say_what_they_expect() {
         let light: LightArg = "1, 2,-3,40".parse().expect("parses");
-        assert_eq!(light.position, Vec3::new(1.0, 2.0, -3.0));
+        assert_eq!(light.position, DVec3::new(1.0, 2.0, -3.0));
         assert_eq!(light.colour, Vec3::ONE);
         for bad in ["", "1,2,3", "1,2,3,4,5", "a,b,c,d"] {
             let error = bad.parse::<LightArg>().expect_err("refused");

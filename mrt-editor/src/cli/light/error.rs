@@ -2,12 +2,12 @@
 
 use crate::cli::dictionary_source::SourceError;
 use crate::cli::hint::after_assembly;
-use crate::cli::import_args::import_hint;
+use crate::cli::import_args::{ReadingMismatch, import_hint};
 use crate::cli::output::ReportError;
 use crate::document::level_file::LevelFileError;
 use crate::import::error::ImportError;
 use crate::render::file::WriteError;
-use glam::Vec3;
+use glam::DVec3;
 use mrt_runtime::{AssembleError, SkippedLight};
 use std::path::PathBuf;
 
@@ -46,6 +46,9 @@ pub enum LightCommandError {
     /// The level's file is at fault.
     #[error(transparent)]
     Level(#[from] LevelFileError),
+    /// A flag contradicts the level.
+    #[error(transparent)]
+    Reading(#[from] ReadingMismatch),
     /// There is no dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -64,7 +67,7 @@ pub enum LightCommandError {
         /// Which light.
         light: usize,
         /// Its position, metres.
-        position: Vec3,
+        position: DVec3,
         /// The nearest block.
         block: usize,
         /// Metres to the block.
@@ -79,7 +82,7 @@ pub enum LightCommandError {
         /// Which light.
         light: usize,
         /// Its position.
-        position: Vec3,
+        position: DVec3,
         /// Directions in which it sees the backs of faces, percent.
         backs: f32,
     },
@@ -93,9 +96,9 @@ pub enum LightCommandError {
     #[error("--camera {from};{to}: expected two different points")]
     Camera {
         /// Where it stands.
-        from: Vec3,
+        from: DVec3,
         /// Where it looks.
-        to: Vec3,
+        to: DVec3,
     },
     /// The files cannot be written.
     #[error(transparent)]

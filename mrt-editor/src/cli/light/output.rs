@@ -1,23 +1,31 @@
 //! The files that `mrt light` leaves: all of them, or none.
 
+use super::report::in_mesh;
 use super::view::View;
 use crate::render::file::{Saves, WriteError, make_folder, write_hdr, write_png};
 use crate::render::lit::LitScene;
 use crate::render::picture::Picture;
 use crate::render::tone::{auto_exposure, tone_map};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use mrt_core::container::write_file_atomically;
 use mrt_runtime::low_level::output::receiver::UnwrappedTriangle;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+/// The mesh with its lightmap coordinates.
+pub(super) struct Unwrapped<'a> {
+    pub(super) triangles: &'a [UnwrappedTriangle],
+    /// Where the level's origin is in the mesh, metres.
+    pub(super) origin: DVec3,
+}
+
 /// Writes into a temporary folder beside `folder` first, and moves the files once all are there.
 pub(super) fn write(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[UnwrappedTriangle],
+    unwrapped: &Unwrapped<'_>,
 ) -> Result<(), WriteError> {
     let mut name = folder.file_name().unwrap_or_default().to_owned();
     name.push(format!(".{}.part", std::process::id()));
@@ -43,7 +51,7 @@ fn write_files(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
-    unwrapped: &[UnwrappedTriangle],
+    unwrapped: &Unwrapped<'_>,
 ) -> Result<Vec<PathBuf>, WriteError> {
     let mut files = Vec::new();
     let mut name = |file: String| {
@@ -73,14 +81,15 @@ fn write_files(
     Ok(files)
 }
 
-/// The mesh with coordinates into the lightmap; v runs upwards, as is usual in OBJ.
-fn obj_text(lit: &LitScene<'_>, unwrapped: &[UnwrappedTriangle]) -> String {
+/// The mesh with coordinates into the lightmap; v runs upwards, as is usual in OBJ. It stands where the file has it.
+fn obj_text(lit: &LitScene<'_>, unwrapped: &Unwrapped<'_>) -> String {
+    let origin = unwrapped.origin;
     let mut text = String::from("mtllib mesh.mtl\n");
     let mut positions = Numbered::default();
     let mut coordinates = Numbered::default();
     let mut faces = String::new();
     let mut last_material = None;
-    for triangle in unwrapped {
+    for triangle in unwrapped.triangles {
         let material = lit.mesh.triangle_materials[triangle.source];
         if last_material != Some(material) {
             last_material = Some(material);
@@ -90,9 +99,11 @@ fn obj_text(lit: &LitScene<'_>, unwrapped: &[UnwrappedTriangle]) -> String {
         let corners = triangle.corners.iter().zip(&triangle.receivers);
         let indices: Vec<String> = corners
             .map(|(corner, at)| {
-                let [x, y, z] = corner.to_array();
-                let position = positions.number([x, y, z], || {
-                    line(&mut text, format_args!("v {x} {y} {z}"));
+                let position = positions.number(corner.to_array(), || {
+                    line(
+                        &mut text,
+                        format_args!("v {}", coordinates_of(*corner, origin)),
+                    );
                 });
                 let (u, v) = (at.u as f32, at.v as f32);
                 let uv = lit.atlas.texture_coordinate(at.block, at.face, u, v);
@@ -126,6 +137,16 @@ impl<const N: usize> Numbered<N> {
             next
         })
     }
+}
+
+/// A point of the level in the mesh's coordinates, as text: with all digits of its own where the level's origin is the mesh's.
+fn coordinates_of(point: Vec3, origin: DVec3) -> String {
+    if origin == DVec3::ZERO {
+        let [x, y, z] = point.to_array();
+        return format!("{x} {y} {z}");
+    }
+    let [x, y, z] = in_mesh(point, origin).to_array();
+    format!("{x} {y} {z}")
 }
 
 fn mtl_text(lit: &LitScene<'_>) -> String {

@@ -3,7 +3,9 @@
 use crate::cli::import_args::print_import;
 use crate::cli::output::print_row;
 use crate::import::report::ImportReport;
-use crate::render::lit::Lamp;
+use crate::render::lamp::position;
+use glam::{DVec3, Vec3};
+use mrt_runtime::Light;
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -11,8 +13,14 @@ pub(super) struct Report {
     pub(super) mesh: ImportReport,
     pub(super) blocks: usize,
     pub(super) connections: usize,
-    /// Rows of [`lamp_row`].
-    pub(super) lights: Vec<[f32; 8]>,
+    /// Spheres and spots.
+    pub(super) lights: Vec<LampRow>,
+    /// Directions and irradiances of suns, W/m².
+    pub(super) suns: Vec<[f32; 6]>,
+    /// Whether the lights are those of the mesh's file.
+    pub(super) lights_of_mesh: bool,
+    /// Walls of the level that shine by themselves.
+    pub(super) emissive_walls: usize,
     pub(super) passes: u32,
     pub(super) dictionary_seconds: f64,
     pub(super) assemble_seconds: f64,
@@ -34,12 +42,46 @@ pub(super) struct ViewReport {
     pub(super) indirect: f32,
 }
 
-/// Position, radius, strongest channel and intensity.
-pub(super) fn lamp_row(lamp: &Lamp) -> [f32; 8] {
-    let [x, y, z] = lamp.position.to_array();
-    let [r, g, b] = lamp.intensity.to_array();
-    let strongest = lamp.intensity.max_element();
-    [x, y, z, lamp.radius, strongest, r, g, b]
+/// Position in the mesh's coordinates, radius, strongest channel and intensity.
+pub(super) type LampRow = (f64, f64, f64, f32, f32, f32, f32, f32);
+
+/// The rows of spheres and spots of a level with its origin at `origin` of the mesh.
+pub(super) fn lamp_rows(lamps: &[Light], origin: DVec3) -> Vec<LampRow> {
+    let row = |lamp: &Light| {
+        let (Light::Sphere {
+            radius, intensity, ..
+        }
+        | Light::Spot {
+            radius, intensity, ..
+        }) = *lamp
+        else {
+            return None;
+        };
+        let [x, y, z] = in_mesh(position(lamp)?, origin).to_array();
+        let [r, g, b] = intensity.to_array();
+        Some((x, y, z, radius, intensity.max_element(), r, g, b))
+    };
+    lamps.iter().filter_map(row).collect()
+}
+
+/// Directions and irradiances of suns.
+pub(super) fn sun_rows(lamps: &[Light]) -> Vec<[f32; 6]> {
+    let row = |lamp: &Light| match *lamp {
+        Light::Directional {
+            direction,
+            irradiance,
+        } => {
+            let ([x, y, z], [r, g, b]) = (direction.to_array(), irradiance.to_array());
+            Some([x, y, z, r, g, b])
+        }
+        _ => None,
+    };
+    lamps.iter().filter_map(row).collect()
+}
+
+/// A point of the level in the mesh's coordinates, to the micrometre: the digits beyond come from f32.
+pub(super) fn in_mesh(point: Vec3, origin: DVec3) -> DVec3 {
+    ((point.as_dvec3() + origin) * 1e6).round() / 1e6
 }
 
 impl Report {
@@ -47,13 +89,25 @@ impl Report {
         print_import(&self.mesh);
         print_row("blocks", self.blocks);
         print_row("connections", self.connections);
-        for [x, y, z, radius, _, r, g, b] in &self.lights {
+        for (x, y, z, radius, _, r, g, b) in &self.lights {
             print_row(
                 "light",
                 format!(
                     "({x:.3}, {y:.3}, {z:.3}) m, radius {radius:.3} m, ({r:.3}, {g:.3}, {b:.3}) W/sr"
                 ),
             );
+        }
+        for [x, y, z, r, g, b] in &self.suns {
+            print_row(
+                "sun",
+                format!("towards ({x:.3}, {y:.3}, {z:.3}), ({r:.3}, {g:.3}, {b:.3}) W/m²"),
+            );
+        }
+        if self.lights_of_mesh {
+            print_row("  from", "the mesh's file");
+        }
+        if self.emissive_walls > 0 {
+            print_row("walls that shine", self.emissive_walls);
         }
         print_row("dictionary", format!("{:.2} s", self.dictionary_seconds));
         print_row("assembly", format!("{:.2} s", self.assemble_seconds));

@@ -3,10 +3,8 @@
 use super::args::{LightArgs, Shadows};
 use super::error::LightCommandError;
 use crate::cli::dictionary_source::load;
-use crate::render::lit::Lamp;
-use crate::render::placement::block_width;
+use crate::render::placement::{Surroundings, block_width};
 use glam::DVec3;
-use mrt_core::geometry::bvh::Bvh;
 use mrt_runtime::shadows::Rays;
 use mrt_runtime::{AssembleConfig, Bounces, Frame, FrameConfig, FrameReport, Level, Light, Scene};
 use std::time::Instant;
@@ -34,8 +32,8 @@ pub(super) struct Solved {
 pub(super) fn solve(
     args: &LightArgs,
     level: &Level,
-    lamps: &[Lamp],
-    bvh: &Bvh,
+    lamps: &[Light],
+    surroundings: &Surroundings<'_>,
 ) -> Result<Solved, LightCommandError> {
     let start = Instant::now();
     let dictionary = load(args.dictionary.as_deref(), args.preset.as_deref())?;
@@ -48,7 +46,7 @@ pub(super) fn solve(
     };
     let mut frame = Frame::new(&scene, config);
     let frame_start = Instant::now();
-    let report = solve_frame(&mut frame, lamps, bvh, args.shadows);
+    let report = solve_frame(&mut frame, lamps, surroundings, args.shadows);
     report.require_all_lights()?;
     Ok(Solved {
         frame,
@@ -59,13 +57,13 @@ pub(super) fn solve(
     })
 }
 
-fn solve_frame(frame: &mut Frame, lamps: &[Lamp], bvh: &Bvh, shadows: Shadows) -> FrameReport {
-    let lights = lamps.iter().map(|lamp| Light::Sphere {
-        position: lamp.position,
-        radius: lamp.radius,
-        intensity: lamp.intensity,
-    });
-    frame.set_lights(&lights.collect::<Vec<_>>());
+fn solve_frame(
+    frame: &mut Frame,
+    lamps: &[Light],
+    surroundings: &Surroundings<'_>,
+    shadows: Shadows,
+) -> FrameReport {
+    frame.set_lights(lamps);
     match shadows {
         Shadows::Openings => frame.solve(),
         Shadows::Rays => {
@@ -74,10 +72,14 @@ fn solve_frame(frame: &mut Frame, lamps: &[Lamp], bvh: &Bvh, shadows: Shadows) -
             let slack = WALL_SLACK * widths.fold(f64::MAX, f64::min);
             frame.solve_with(&Rays(|receiver: DVec3, light: DVec3| {
                 // From the light, and short of the receiver: a block's wall stands a little behind the real one.
+                // The sun is far away, where f32 is coarse: nothing stands beyond the mesh's size.
                 let towards = receiver - light;
+                let towards = towards.clamp_length_max(f64::from(surroundings.reach()));
+                let start = (receiver - towards).as_vec3();
                 let reach = 1.0 - slack / towards.length();
-                let is_blocked = reach > 0.0
-                    && bvh.is_occluded(light.as_vec3(), towards.as_vec3(), reach as f32);
+                let bvh = surroundings.bvh;
+                let is_blocked =
+                    reach > 0.0 && bvh.is_occluded(start, towards.as_vec3(), reach as f32);
                 if is_blocked { 0.0 } else { 1.0 }
             }))
         }

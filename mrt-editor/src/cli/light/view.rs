@@ -4,11 +4,15 @@ use super::args::{Exposure, LightArgs};
 use super::error::LightCommandError;
 use super::report::ViewReport;
 use crate::render::camera::Camera;
+use crate::render::lamp::position;
 use crate::render::lit::LitScene;
 use crate::render::picture::Picture;
-use crate::render::placement::{Surroundings, VIEW_ANGLE_RAD, camera_at_light, overview};
+use crate::render::placement::{
+    Surroundings, VIEW_ANGLE_RAD, camera_at_light, light_places, overview,
+};
 use crate::render::render;
 use crate::render::tone::{auto_exposure, luminance};
+use glam::{DVec3, Vec3};
 use mrt_runtime::Level;
 
 /// Cameras placed at lamps when none is given.
@@ -48,6 +52,11 @@ struct NamedCamera {
     is_outside: bool,
 }
 
+/// Where the level's origin is in the mesh, metres.
+pub(super) fn level_origin(level: &Level) -> DVec3 {
+    level.mesh.as_ref().map_or(DVec3::ZERO, |mesh| mesh.origin)
+}
+
 /// Renders the views asked for, or views at the first lamps and one of everything.
 pub(super) fn views(
     args: &LightArgs,
@@ -60,11 +69,12 @@ pub(super) fn views(
     let cameras = if args.camera.is_empty() {
         default_cameras(lit, level, surroundings, aspect)
     } else {
-        cameras_asked_for(args, aspect)?
+        cameras_asked_for(args, level_origin(level), aspect)?
     };
     let view = |named: NamedCamera| {
         let lit = LitScene {
             hides_outside: named.is_outside && !surroundings.is_reversed,
+            pixel_angle: VIEW_ANGLE_RAD / height as f32,
             ..*lit
         };
         photograph(args, &lit, named)
@@ -72,10 +82,15 @@ pub(super) fn views(
     Ok(cameras.into_iter().map(view).collect())
 }
 
-fn cameras_asked_for(args: &LightArgs, aspect: f32) -> Result<Vec<NamedCamera>, LightCommandError> {
+fn cameras_asked_for(
+    args: &LightArgs,
+    origin: DVec3,
+    aspect: f32,
+) -> Result<Vec<NamedCamera>, LightCommandError> {
     let mut cameras = Vec::with_capacity(args.camera.len());
     for (index, view) in args.camera.iter().enumerate() {
-        let camera = Camera::look_at(view.from, view.to, VIEW_ANGLE_RAD, aspect);
+        let [from, to] = [view.from, view.to].map(|point| (point - origin).as_vec3());
+        let camera = Camera::look_at(from, to, VIEW_ANGLE_RAD, aspect);
         cameras.push(NamedCamera {
             name: format!("view{}", index + 1),
             camera: camera.ok_or(LightCommandError::Camera {
@@ -94,9 +109,15 @@ fn default_cameras(
     surroundings: &Surroundings<'_>,
     aspect: f32,
 ) -> Vec<NamedCamera> {
+    let mut places: Vec<Vec3> = lit.lamps.iter().filter_map(position).collect();
+    if places.is_empty() {
+        // The sun has no place, and surfaces that shine may be anywhere.
+        let free = light_places(surroundings, level, DEFAULT_VIEWS);
+        places.extend(free.iter().map(|place| place.position));
+    }
     let mut cameras = Vec::new();
-    for (index, lamp) in lit.lamps.iter().take(DEFAULT_VIEWS).enumerate() {
-        let camera = camera_at_light(surroundings, lamp.position, aspect);
+    for (index, place) in places.into_iter().take(DEFAULT_VIEWS).enumerate() {
+        let camera = camera_at_light(surroundings, place, aspect);
         cameras.extend(camera.map(|camera| NamedCamera {
             name: format!("view{}", index + 1),
             camera,

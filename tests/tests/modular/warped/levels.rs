@@ -77,6 +77,7 @@ fn corridor(lengths: &[f64]) -> Level {
         connections: connections.collect(),
         blocks,
         doors: Vec::new(),
+        mesh: None,
     }
 }
 
