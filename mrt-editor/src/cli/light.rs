@@ -12,18 +12,21 @@ mod warnings;
 pub use args::{Exposure, LightArg, LightArgs, Shadows, ViewArg};
 pub use error::LightCommandError;
 
-use crate::cli::output::{folder_of, is_same_place, print_report};
+use crate::cli::output::print_report;
+use crate::cli::output_files::{OutputFiles, is_same_place};
 use crate::document::level_file::read_level;
 use crate::fit_level::mesh_samples::sample_mesh;
 use crate::fit_level::paint::coverage;
 use crate::import::read_scene;
 use crate::render::lit::LitScene;
 use crate::render::placement::Surroundings;
+use mrt_core::container::place::folder_of;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::{TriangleMesh, corner_normals};
 use mrt_runtime::Level;
 use mrt_runtime::low_level::output::receiver::{ReceiverMap, unwrap_mesh};
 use report::{Report, lamp_row};
+use std::path::PathBuf;
 use std::time::Instant;
 use view::View;
 
@@ -85,7 +88,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     Ok(print_report(&report, args.json, Report::print)?)
 }
 
-/// The output folder must hold neither the mesh nor the level.
+/// The output folder must hold neither the mesh nor the level, nor links to what is read.
 fn check_output(args: &LightArgs) -> Result<(), LightCommandError> {
     for input in [&args.scene, &args.level] {
         if is_same_place(folder_of(input), &args.out) {
@@ -95,6 +98,11 @@ fn check_output(args: &LightArgs) -> Result<(), LightCommandError> {
             });
         }
     }
+    let inputs = [&args.scene, &args.level]
+        .into_iter()
+        .chain(&args.dictionary);
+    let outputs = OutputFiles::new(inputs.map(PathBuf::as_path));
+    outputs.check_folder("--out", &args.out, &["png", "hdr", "obj", "mtl"])?;
     Ok(())
 }
 

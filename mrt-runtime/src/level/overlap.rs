@@ -1,6 +1,7 @@
 //! Finds blocks that share a volume, by separating axes over candidate pairs.
 
 use crate::level::block::Level;
+use crate::level::box_pairs::for_each_pair;
 use crate::level::error::{LevelError, OVERLAP_TOLERANCE};
 use glam::DVec3;
 use mrt_core::geometry::cube::Face;
@@ -8,44 +9,36 @@ use mrt_core::geometry::hexahedron::Hexahedron;
 
 /// Checks that no two blocks of the level enter each other deeper than [`OVERLAP_TOLERANCE`].
 ///
-/// Each block is replaced by the convex hull of its corners, which contains the warped block. A sweep along x finds the
-/// pairs to test, so the cost is near-linear unless many blocks share a range of x.
+/// Each block is replaced by the convex hull of its corners, which contains the warped block. Only blocks whose bounds
+/// overlap are tested, and the cost of finding those is near-linear.
 pub(crate) fn check(level: &Level) -> Result<(), LevelError> {
     let bounds: Vec<_> = level.blocks.iter().map(|b| b.warp.bounds()).collect();
-    let mut order: Vec<usize> = (0..bounds.len()).collect();
-    order.sort_by(|&i, &j| bounds[i].0.x.total_cmp(&bounds[j].0.x));
-    let mut active: Vec<usize> = Vec::new();
     let mut tests = 0;
-    for &b in &order {
-        active.retain(|&a| bounds[a].1.x > bounds[b].0.x);
-        for &a in &active {
-            let apart =
-                bounds[a].1.cmple(bounds[b].0).any() || bounds[b].1.cmple(bounds[a].0).any();
-            if apart {
-                continue;
-            }
-            let (warp_a, warp_b) = (&level.blocks[a].warp, &level.blocks[b].warp);
-            tests += 1;
-            if tests > MAX_TESTS_PER_BLOCK * bounds.len() {
-                return Err(LevelError::TooCrowded {
-                    expected: MAX_TESTS_PER_BLOCK,
-                });
-            }
-            // The hull of a bent block reaches beyond the block by no more than its faces are bent.
-            let expected = OVERLAP_TOLERANCE * warp_a.diagonal().min(warp_b.diagonal())
-                + bend(warp_a)
-                + bend(warp_b);
-            let found = penetration(warp_a, warp_b, expected);
-            if found > expected {
-                return Err(LevelError::Overlap {
-                    a: a.min(b),
-                    b: a.max(b),
-                    expected,
-                    found,
-                });
-            }
+    for_each_pair(&bounds, |a, b| {
+        tests += 1;
+        if tests > MAX_TESTS_PER_BLOCK * bounds.len() {
+            return Err(LevelError::TooCrowded {
+                expected: MAX_TESTS_PER_BLOCK,
+            });
         }
-        active.push(b);
+        check_pair(level, a, b)
+    })?;
+    Ok(())
+}
+
+fn check_pair(level: &Level, a: usize, b: usize) -> Result<(), LevelError> {
+    let (warp_a, warp_b) = (&level.blocks[a].warp, &level.blocks[b].warp);
+    // The hull of a bent block reaches beyond the block by no more than its faces are bent.
+    let expected =
+        OVERLAP_TOLERANCE * warp_a.diagonal().min(warp_b.diagonal()) + bend(warp_a) + bend(warp_b);
+    let found = penetration(warp_a, warp_b, expected);
+    if found > expected {
+        return Err(LevelError::Overlap {
+            a: a.min(b),
+            b: a.max(b),
+            expected,
+            found,
+        });
     }
     Ok(())
 }

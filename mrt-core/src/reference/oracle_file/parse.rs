@@ -31,8 +31,8 @@ pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
             Shown(parsed.name),
         ));
     }
-    let walls = check_level(&file, &parsed)?;
-    let (kind, expected_shape) = check_kind(&file, &parsed, &walls)?;
+    let (index, walls) = check_level(&file, &parsed)?;
+    let (kind, expected_shape) = check_kind(&file, &parsed, (&index, &walls))?;
     if parsed.shape != expected_shape {
         return Err(file.malformed("shape", Shown(&expected_shape), Shown(&parsed.shape)));
     }
