@@ -68,7 +68,7 @@ pub fn check_is_file(path: &Path) -> io::Result<Option<Metadata>> {
 }
 
 /// Refuses what is no plain file.
-pub(super) fn check_kind(found: &Metadata) -> io::Result<()> {
+pub(crate) fn check_kind(found: &Metadata) -> io::Result<()> {
     if found.is_file() {
         return Ok(());
     }
