@@ -61,14 +61,14 @@ pub fn folder_of(file: &Path) -> &Path {
 /// device, a socket. The message says which.
 pub fn check_is_file(path: &Path) -> io::Result<Option<Metadata>> {
     match fs::metadata(path) {
-        Ok(found) => check_kind(&found).map(|()| Some(found)),
+        Ok(found) => check_plain(&found).map(|()| Some(found)),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(error),
     }
 }
 
 /// Refuses what is no plain file.
-pub(crate) fn check_kind(found: &Metadata) -> io::Result<()> {
+pub(crate) fn check_plain(found: &Metadata) -> io::Result<()> {
     if found.is_file() {
         return Ok(());
     }

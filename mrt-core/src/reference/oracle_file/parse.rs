@@ -4,7 +4,7 @@ use super::context::{FileContext, Shown};
 use super::description::{Description, check_kind, check_level};
 use super::error::ReferenceError;
 use super::reference_file::{Kind, ReferenceFile};
-use crate::container::place::check_kind;
+use crate::container::place::check_plain;
 use glam::DVec3;
 use std::path::Path;
 
@@ -64,7 +64,7 @@ pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
 /// Bytes of a plain file. A pipe has none, and reading it would wait until somebody writes to it.
 fn size_of_file(path: &Path) -> std::io::Result<u64> {
     let found = std::fs::metadata(path)?;
-    check_kind(&found)?;
+    check_plain(&found)?;
     Ok(found.len())
 }
 
