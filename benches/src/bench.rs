@@ -38,22 +38,24 @@ use library::Libraries;
 use lit_maze::LitMaze;
 use machine::Machine;
 use measure::{Baseline, Bench};
-use mrt_editor::cli::output::check_out_folder;
+use mrt_editor::cli::output_files::OutputFiles;
 use mrt_editor::cli::progress::with_progress;
 use mrt_editor::render::file::make_folder;
 use record::{Record, mark_pareto};
 use report::{print_goals, print_records, write_goals, write_records};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Measures, prints and writes.
 ///
 /// # Errors
 /// [`BenchError`].
 pub fn run(args: &BenchArgs) -> Result<(), BenchError> {
-    check_out_folder(&args.out)?;
-    let dictionaries = Dictionaries::new(args)?;
+    let outputs = OutputFiles::new(args.dictionary.iter().map(PathBuf::as_path));
+    outputs.check_folder("--out", &args.out, &["csv", "svg", "png"])?;
     let kept = args.out.join("exact");
+    outputs.check_folder("--out", &kept, &["json"])?;
+    let dictionaries = Dictionaries::new(args)?;
     make_folder(&kept)?;
     let machine = Machine::measure();
     if args.figures {

@@ -14,8 +14,10 @@ mod white_face;
 pub use error::{FigureError, FiguresError};
 
 use crate::canvas::Canvas;
+use mrt_core::excerpt::excerpt;
 use mrt_editor::cli::dictionary_source::load;
-use mrt_editor::cli::output::{check_out_folder, print_report, warn};
+use mrt_editor::cli::output::{print_report, warn};
+use mrt_editor::cli::output_files::OutputFiles;
 use mrt_editor::cli::table::Table;
 use mrt_editor::render::file::{WriteError, make_folder};
 use serde::Serialize;
@@ -126,7 +128,8 @@ struct FigureReport {
 /// # Errors
 /// [`FiguresError`]. A figure whose source is absent counts only if it was asked for by name.
 pub fn run(args: &FiguresArgs) -> Result<(), FiguresError> {
-    check_out_folder(&args.out)?;
+    let outputs = OutputFiles::new(args.dictionary.as_deref());
+    outputs.check_folder("--out", &args.out, &["png"])?;
     let dictionary = load(args.dictionary.as_deref(), None)?;
     let source = FigureSource {
         dictionary: &dictionary,
@@ -195,5 +198,5 @@ fn print(report: &FiguresReport) {
         ]);
     }
     mrt_editor::report!("{table}");
-    mrt_editor::report_line!("dictionary: preset {}", report.preset);
+    mrt_editor::report_line!("dictionary: preset {}", excerpt(&report.preset));
 }

@@ -18,6 +18,7 @@ mod layout;
 mod error;
 mod budget;
 mod element;
+pub mod place;
 mod file;
 mod table;
 mod writer;
@@ -28,7 +29,9 @@ pub use budget::ByteBudget;
 pub use element::{ElementType, SectionNumber};
 pub use error::ContainerError;
 pub(crate) use error::malformed;
-pub use file::{read_file, write_file_atomically};
+pub use file::{
+    StagedFile, check_folder_is_writable, read_file, remove_abandoned_parts, write_file_atomically,
+};
 pub use layout::{ALIGNMENT, Format, LAYOUT_VERSION, MAX_SECTIONS};
 pub use reader::Container;
 pub use writer::Writer;

@@ -8,6 +8,7 @@
 //! Features: `svd` adds decompositions to `linalg`, `bvh` adds `geometry::bvh`, and `reference` adds `reference`. A
 //! running game needs none of them.
 
+pub mod excerpt;
 pub mod linalg;
 pub mod geometry;
 pub mod lighting;

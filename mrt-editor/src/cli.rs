@@ -2,6 +2,7 @@
 
 mod hint;
 pub mod output;
+pub mod output_files;
 pub mod table;
 pub mod progress;
 pub mod dictionary_source;

@@ -15,6 +15,7 @@ pub mod error;
 pub mod warp_form;
 pub mod placed;
 pub(crate) mod block_grid;
+mod box_pairs;
 mod overlap;
 mod check;
 #[cfg(feature = "generator")]

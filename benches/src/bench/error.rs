@@ -5,7 +5,8 @@ use super::measure_error::MeasureError;
 use mrt_dictionary::config::ConfigError;
 use mrt_dictionary::progress::Cancelled;
 use mrt_editor::cli::dictionary_source::SourceError;
-use mrt_editor::cli::output::{OutIsFile, ReportError};
+use mrt_editor::cli::output::ReportError;
+use mrt_editor::cli::output_files::OutputError;
 use mrt_editor::render::file::WriteError;
 
 /// Why there is no benchmark.
@@ -26,9 +27,9 @@ pub enum BenchError {
     /// No exact light.
     #[error(transparent)]
     Exact(#[from] ExactLightError),
-    /// A file stands where the folder should be.
+    /// Files cannot be written there.
     #[error(transparent)]
-    OutIsFile(#[from] OutIsFile),
+    Output(#[from] OutputError),
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

@@ -5,7 +5,8 @@ use mrt_core::reference::radiosity::ExactError;
 use mrt_dictionary::progress::Cancelled;
 use mrt_editor::accuracy::reference_file::CompareError;
 use mrt_editor::cli::dictionary_source::SourceError;
-use mrt_editor::cli::output::{OutIsFile, ReportError};
+use mrt_editor::cli::output::ReportError;
+use mrt_editor::cli::output_files::OutputError;
 use mrt_editor::render::file::WriteError;
 use mrt_editor::render::level_view::ViewError;
 use mrt_runtime::{AssembleError, LevelTextError, SkippedLight};
@@ -71,9 +72,9 @@ pub enum FiguresError {
     /// No dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
-    /// A file stands where the folder should be.
+    /// Files cannot be written there.
     #[error(transparent)]
-    OutIsFile(#[from] OutIsFile),
+    Output(#[from] OutputError),
     /// A picture cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),

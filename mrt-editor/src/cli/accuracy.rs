@@ -9,6 +9,9 @@ use crate::cli::dictionary_source::{
 };
 use crate::cli::output::{ReportError, print_json, warn};
 use crate::cli::table::Table;
+use mrt_core::excerpt::excerpt;
+use mrt_core::geometry::cube::Face;
+use mrt_core::reference::cells::CellIndex;
 use mrt_core::reference::error_measure::HOP_GROUPS;
 use mrt_core::reference::oracle_file::{ReferenceFile, read};
 use mrt_dictionary::config::BakeConfig;
@@ -191,9 +194,9 @@ impl<'a> Dictionaries<'a> {
 
 /// True when some cell stands on another.
 fn opens_upwards(cells: &[[i32; 3]]) -> bool {
-    cells
-        .iter()
-        .any(|&[x, y, z]| y.checked_add(1).is_some_and(|y| cells.contains(&[x, y, z])))
+    let (index, _) = CellIndex::new(cells);
+    let mut cells = cells.iter();
+    cells.any(|&cell| index.across(cell, Face::PosY).is_some())
 }
 
 fn print(all: &[LightAccuracy]) {
@@ -213,7 +216,7 @@ fn print(all: &[LightAccuracy]) {
     let means = std::iter::once(whole).chain(by_hop);
     table.row(names.into_iter().chain(means.map(percent)));
     crate::report!("{table}");
-    crate::report_line!("preset {}, {}", all[0].preset, all[0].term);
+    crate::report_line!("preset {}, {}", excerpt(&all[0].preset), all[0].term);
 }
 
 fn percent(error: Option<f64>) -> String {

@@ -1,11 +1,12 @@
 //! `mrt adapt`: gives warped blocks operators of their own.
 
 use crate::cli::dictionary_source::{SourceError, load};
-use crate::cli::output::{ReportError, is_same_place, print_report};
+use crate::cli::output::{ReportError, print_report};
+use crate::cli::output_files::{OutputError, OutputFiles};
 use crate::cli::progress::with_progress;
 use crate::cli::table::Table;
-use crate::document::level_file::{LevelFileError, read_level, write_level};
-use mrt_core::container::{ContainerError, write_file_atomically};
+use crate::document::level_file::{LevelFileError, read_level, stage_level};
+use mrt_core::container::{ContainerError, StagedFile};
 use mrt_dictionary::modular::variants::advice::{BlockEstimate, Thresholds, estimate_blocks};
 use mrt_dictionary::modular::variants::build::{
     VariantConfig, VariantError, has_hole, make_variants,
@@ -82,12 +83,9 @@ pub enum AdaptError {
         /// The value given.
         found: f64,
     },
-    /// Two of the files are one: both outputs, or the dictionary and the level that is read.
-    #[error("{}: expected two files, one for a level and one for the dictionary", path.display())]
-    SameFile {
-        /// The file.
-        path: PathBuf,
-    },
+    /// An output cannot be written there.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The dictionary cannot be written.
     #[error(transparent)]
     Write(#[from] ContainerError),
@@ -128,7 +126,7 @@ struct ExpectedErrors {
 ///
 /// # Errors
 /// [`AdaptError`]; then no file is written or changed, except that the dictionary may be there when the
-/// level cannot be written.
+/// level, already on the disk, cannot be given its name.
 pub fn run(args: &AdaptArgs) -> Result<(), AdaptError> {
     check(args)?;
     let level = read_level(&args.level)?;
@@ -170,9 +168,11 @@ fn write_adapted(
     };
     add_variants(dictionary, made);
     let bytes = dictionary.to_bytes()?;
+    let staged = StagedFile::write(out_dictionary, &bytes)?;
+    let level = stage_level(out_level, adapted)?;
     // The dictionary comes first: one with more than a level needs does no harm.
-    write_file_atomically(out_dictionary, &bytes)?;
-    write_level(out_level, adapted)?;
+    staged.commit()?;
+    level.commit()?;
     Ok(Some(report))
 }
 
@@ -186,20 +186,13 @@ fn check(args: &AdaptArgs) -> Result<(), AdaptError> {
             return Err(AdaptError::Threshold { name, found });
         }
     }
-    // The level may be adapted in place; a dictionary in its place would lose it.
-    if let Some(dictionary) = &args.out_dictionary
-        && is_same_place(&args.level, dictionary)
-    {
-        return Err(AdaptError::SameFile {
-            path: args.level.clone(),
-        });
+    let inputs = [&args.level].into_iter().chain(&args.dictionary);
+    let mut outputs = OutputFiles::new(inputs.map(PathBuf::as_path));
+    if let Some(level) = &args.out_level {
+        outputs.check_file("--out-level", level)?;
     }
-    if let (Some(level), Some(dictionary)) = (&args.out_level, &args.out_dictionary)
-        && (level == dictionary || is_same_place(level, dictionary))
-    {
-        return Err(AdaptError::SameFile {
-            path: level.clone(),
-        });
+    if let Some(dictionary) = &args.out_dictionary {
+        outputs.check_file("--out-dictionary", dictionary)?;
     }
     Ok(())
 }

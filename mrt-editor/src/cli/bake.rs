@@ -2,14 +2,15 @@
 
 use crate::cli::dictionary_report::{CouplingReport, StorageArg};
 use crate::cli::dictionary_source::{DEFAULT_PRESET, bake_with_progress};
-use crate::cli::output::{ReportError, folder_of, print_report};
+use crate::cli::output::{ReportError, print_report};
+use crate::cli::output_files::{OutputError, OutputFiles};
 use crate::cli::table::Table;
 use mrt_core::container::{ContainerError, write_file_atomically};
 use mrt_dictionary::config::{BakeConfig, ConfigError};
 use mrt_dictionary::progress::Cancelled;
 use mrt_runtime::{Dictionary, DictionaryError};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Bakes a dictionary of canonical shapes; the same settings give the same bytes.
@@ -78,20 +79,9 @@ pub enum BakeError {
     /// The dictionary has no form as bytes.
     #[error(transparent)]
     Dictionary(#[from] DictionaryError),
-    /// A folder stands where the file should be.
-    #[error("cannot write {file}: found a folder; expected the name of a file")]
-    IsFolder {
-        /// The file to write.
-        file: String,
-    },
-    /// The folder does not exist.
-    #[error("cannot write {file}: found no folder {found}; expected one that exists")]
-    NoFolder {
-        /// The file to write.
-        file: String,
-        /// The folder that is missing.
-        found: String,
-    },
+    /// The dictionary cannot be written there.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The file cannot be written.
     #[error(transparent)]
     File(#[from] ContainerError),
@@ -129,7 +119,7 @@ struct ShapeReport {
 /// [`BakeError`]; the file is then as it was.
 pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
     let config = config(args)?;
-    check_folder(&args.out)?;
+    OutputFiles::new([]).check_file("--out", &args.out)?;
     let start = Instant::now();
     let dictionary = bake_with_progress(&config)?;
     let bytes = dictionary.stored_as(args.storage.into()).to_bytes()?;
@@ -141,23 +131,6 @@ pub fn run(args: &BakeArgs) -> Result<(), BakeError> {
         start.elapsed().as_secs_f64(),
     );
     Ok(print_report(&report, args.json, print)?)
-}
-
-/// Checks that the file can be written: before the bake, which takes long, rather than after it.
-fn check_folder(file: &Path) -> Result<(), BakeError> {
-    let folder = folder_of(file);
-    if file.is_dir() {
-        Err(BakeError::IsFolder {
-            file: file.display().to_string(),
-        })
-    } else if folder.is_dir() {
-        Ok(())
-    } else {
-        Err(BakeError::NoFolder {
-            file: file.display().to_string(),
-            found: folder.display().to_string(),
-        })
-    }
 }
 
 fn config(args: &BakeArgs) -> Result<BakeConfig, ConfigError> {

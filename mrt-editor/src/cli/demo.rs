@@ -5,11 +5,13 @@ mod pictures;
 use crate::accuracy::exact_level::{ExactLevelError, LevelErrors, measure};
 use crate::cli::dictionary_source::{SourceError, load};
 use crate::cli::hint::after_assembly;
-use crate::cli::output::{OutIsFile, ReportError, check_out_folder, print_report};
+use crate::cli::output::{ReportError, print_report};
+use crate::cli::output_files::{OutputError, OutputFiles};
 use crate::cli::table::Table;
 use crate::document::built_in::MAZE;
 use crate::document::level_file::{LevelFileError, read_level};
 use glam::{DVec3, Vec3};
+use mrt_core::excerpt::excerpt;
 use mrt_runtime::{
     AssembleConfig, AssembleError, Bounces, Dictionary, Frame, FrameConfig, Level, LevelTextError,
     Light, Scene, SkippedLight, StageTimes,
@@ -60,9 +62,9 @@ impl Default for DemoArgs {
 /// Why the demo stopped.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
-    /// A file stands where the folder should be.
+    /// The pictures cannot be written there.
     #[error(transparent)]
-    OutIsFile(#[from] OutIsFile),
+    Output(#[from] OutputError),
     /// No dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -110,7 +112,9 @@ struct DemoReport {
 /// # Errors
 /// [`DemoError`].
 pub fn run(args: &DemoArgs) -> Result<(), DemoError> {
-    check_out_folder(&args.out)?;
+    let inputs = args.level.iter().chain(&args.dictionary);
+    let outputs = OutputFiles::new(inputs.map(PathBuf::as_path));
+    outputs.check_folder("--out", &args.out, &["png"])?;
     let dictionary = load(args.dictionary.as_deref(), None)?;
     let level = level(args)?;
     let start = Instant::now();
@@ -248,7 +252,7 @@ fn print(report: &DemoReport) {
         report.blocks,
         report.connections,
         report.texels,
-        report.preset
+        excerpt(&report.preset)
     );
     crate::report_line!("modes by shape: {}", modes.join(", "));
     crate::report_line!(

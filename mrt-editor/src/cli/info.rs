@@ -4,12 +4,16 @@ use crate::cli::dictionary_report::{CouplingReport, kind_bytes};
 use crate::cli::dictionary_source::{DictionaryBytes, SourceError};
 use crate::cli::output::{ReportError, print_report};
 use crate::cli::table::Table;
+use mrt_core::excerpt::{excerpt, printable};
 use mrt_core::storage::StoredMatrix;
 use mrt_dictionary::modular::spectrum::{Spectrum, closed_cube_spectra};
 use mrt_dictionary::progress::{Cancelled, Progress};
 use mrt_runtime::low_level::modular::dictionary::{ShapeOperators, StoredDictionary};
 use serde::Serialize;
 use std::path::PathBuf;
+
+/// Most characters of a dictionary's settings that are shown: several times what a bake writes.
+const LONGEST_SETTINGS: usize = 2000;
 
 /// Shows a dictionary's shapes, ranks and sizes.
 #[derive(Clone, Debug, clap::Args)]
@@ -159,7 +163,11 @@ fn shape_info(entry: &ShapeOperators<StoredMatrix>) -> ShapeInfo {
 
 fn print(info: &Info) {
     crate::report_line!("{}", info.file);
-    crate::report_line!("preset {}: {}", info.preset, info.settings);
+    let (preset, settings) = (
+        excerpt(info.preset),
+        printable(info.settings, LONGEST_SETTINGS),
+    );
+    crate::report_line!("preset {preset}: {settings}");
     print_shapes(&info.shapes);
     info.coupling.print();
     print_operators(&info.operators);

@@ -13,7 +13,8 @@ pub use args::{Exposure, LightArg, LightArgs, Shadows, ViewArg};
 pub use error::LightCommandError;
 
 use crate::cli::import_args::warn_of_import;
-use crate::cli::output::{folder_of, is_same_place, print_report};
+use crate::cli::output::print_report;
+use crate::cli::output_files::{OutputFiles, is_same_place};
 use crate::document::level_file::read_level;
 use crate::fit_level::mesh_samples::{MeshSample, sample_mesh};
 use crate::fit_level::paint::{PaintedMesh, coverage, distances, material_albedos};
@@ -21,12 +22,14 @@ use crate::import::report::ImportReport;
 use crate::import::{ImportedScene, read_scene};
 use crate::render::lit::LitScene;
 use crate::render::placement::{Surroundings, VIEW_ANGLE_RAD};
+use mrt_core::container::place::folder_of;
 use mrt_core::geometry::bvh::Bvh;
 use mrt_core::geometry::mesh::corner_normals;
 use mrt_runtime::Level;
 use mrt_runtime::low_level::output::receiver::{ReceiverMap, unwrap_mesh};
 use places::{Lamps, Place};
 use report::{Report, lamp_rows, sun_rows};
+use std::path::PathBuf;
 use std::time::Instant;
 use view::{View, level_origin};
 
@@ -145,7 +148,7 @@ fn give_materials_their_means(scene: &mut ImportedScene, points: &[MeshSample]) 
     }
 }
 
-/// The output folder must hold neither the mesh nor the level.
+/// The output folder must hold neither the mesh nor the level, nor links to what is read.
 fn check_output(args: &LightArgs) -> Result<(), LightCommandError> {
     for input in [&args.scene, &args.level] {
         if is_same_place(folder_of(input), &args.out) {
@@ -155,6 +158,11 @@ fn check_output(args: &LightArgs) -> Result<(), LightCommandError> {
             });
         }
     }
+    let inputs = [&args.scene, &args.level]
+        .into_iter()
+        .chain(&args.dictionary);
+    let outputs = OutputFiles::new(inputs.map(PathBuf::as_path));
+    outputs.check_folder("--out", &args.out, &["png", "hdr", "obj", "mtl"])?;
     Ok(())
 }
 

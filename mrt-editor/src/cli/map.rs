@@ -1,7 +1,8 @@
 //! `mrt map`: writes a level around a mesh.
 
 use crate::cli::import_args::{ImportArgs, import_hint, print_import, warn_of_import};
-use crate::cli::output::{ReportError, is_same_place, print_report, print_row};
+use crate::cli::output::{ReportError, print_report, print_row};
+use crate::cli::output_files::{OutputError, OutputFiles};
 use crate::document::level_file::{LevelFileError, write_level};
 use crate::fit_level::config::{Fit, MapConfig, MapError};
 use crate::fit_level::paint::{Coverage, PaintReport, PaintedMesh};
@@ -76,12 +77,9 @@ pub enum MapCommandError {
     /// The report has no form as JSON.
     #[error(transparent)]
     Report(#[from] ReportError),
-    /// The level would replace the mesh.
-    #[error("--out {}: found the mesh itself; expected another file", path.display())]
-    OutIsScene {
-        /// The file.
-        path: PathBuf,
-    },
+    /// The level cannot be written there.
+    #[error(transparent)]
+    Output(#[from] OutputError),
 }
 
 /// The flags that may help, as the end of an error's line.
@@ -120,11 +118,7 @@ struct Report {
 /// # Errors
 /// [`MapCommandError`]; then no file is written or changed.
 pub fn run(args: &MapArgs) -> Result<(), MapCommandError> {
-    if is_same_place(&args.scene, &args.out) {
-        return Err(MapCommandError::OutIsScene {
-            path: args.out.clone(),
-        });
-    }
+    OutputFiles::new([&*args.scene]).check_file("--out", &args.out)?;
     let start = Instant::now();
     let scene = read_scene(&args.scene, &args.import.config())?;
     warn_of_import(&scene.report);

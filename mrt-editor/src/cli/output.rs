@@ -1,10 +1,11 @@
-//! What a command leaves: a report on standard output, which may be a closed pipe or a full disk, files that must not
-//! replace its inputs, and an exit code.
+//! What a command leaves besides files: a report on standard output, which may be a closed pipe or a full disk, and an
+//! exit code.
 
+use mrt_core::excerpt::printable;
 use serde::Serialize;
 use std::fmt::{Arguments, Display};
 use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// What the process ends with: on failure status 1, after the error as one line on standard error.
@@ -18,9 +19,11 @@ pub fn exit_code(result: Result<(), impl Display>) -> ExitCode {
     }
 }
 
-/// Writes one line to standard error, after the program's name.
+/// Writes one line to standard error, after the program's name. Names of files and what stands in them may hold signs
+/// that a terminal obeys: they are written as escapes.
 pub fn warn(text: Arguments<'_>) {
-    eprintln!("{}: {text}", program_name());
+    let line = printable(&text.to_string(), usize::MAX);
+    eprintln!("{}: {line}", program_name());
 }
 
 /// The name by which the program was called, without its folder and extension.
@@ -89,41 +92,4 @@ pub fn print_json(record: &impl Serialize) -> Result<(), ReportError> {
 /// Prints a named value, in line with the others.
 pub fn print_row(name: &str, value: impl Display) {
     crate::report_line!("{name:<22} {value}");
-}
-
-/// A file stands where the output folder should be.
-#[derive(Debug, thiserror::Error)]
-#[error("--out {}: found a file; expected a folder or a new name", path.display())]
-pub struct OutIsFile {
-    /// The file.
-    pub path: PathBuf,
-}
-
-/// Checks that `out` is or can become a folder: before the work rather than after it.
-///
-/// # Errors
-/// [`OutIsFile`].
-pub fn check_out_folder(out: &Path) -> Result<(), OutIsFile> {
-    if out.exists() && !out.is_dir() {
-        return Err(OutIsFile {
-            path: out.to_owned(),
-        });
-    }
-    Ok(())
-}
-
-/// The folder that a file is in.
-pub fn folder_of(file: &Path) -> &Path {
-    match file.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    }
-}
-
-/// True when both paths exist and lead to the same file or folder.
-pub fn is_same_place(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    }
 }

@@ -3,7 +3,8 @@
 use crate::cli::dictionary_report::{CouplingArg, KindBytes, StorageArg, kind_bytes};
 use crate::cli::dictionary_source::{DictionaryBytes, SourceError};
 use crate::cli::hint::after_assembly;
-use crate::cli::output::{ReportError, is_same_place, print_report};
+use crate::cli::output::{ReportError, print_report};
+use crate::cli::output_files::{OutputError, OutputFiles};
 use crate::cli::table::Table;
 use crate::document::level_file::{LevelFileError, read_level};
 use mrt_core::container::{ContainerError, write_file_atomically};
@@ -54,12 +55,9 @@ pub enum PackError {
     /// The level cannot be read, or is at fault.
     #[error(transparent)]
     Level(#[from] LevelFileError),
-    /// The output would replace the level.
-    #[error("--out {}: expected another file than the level", path.display())]
-    SameFile {
-        /// The file.
-        path: PathBuf,
-    },
+    /// The dictionary cannot be written there.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// There is no dictionary.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -103,12 +101,9 @@ struct KindReport {
 /// # Errors
 /// [`PackError`]; the file is then as it was.
 pub fn run(args: &PackArgs) -> Result<(), PackError> {
+    let inputs = [&args.level].into_iter().chain(&args.dictionary);
+    OutputFiles::new(inputs.map(PathBuf::as_path)).check_file("--out", &args.out)?;
     let level = read_level(&args.level)?;
-    if is_same_place(&args.level, &args.out) {
-        return Err(PackError::SameFile {
-            path: args.out.clone(),
-        });
-    }
     let source = DictionaryBytes::of(args.dictionary.as_deref())?;
     let whole = source.read_stored()?;
     let part = pack(&level, &whole, &config(args))?;

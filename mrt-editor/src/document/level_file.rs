@@ -1,6 +1,6 @@
 //! A level as a file.
 
-use mrt_core::container::{ContainerError, write_file_atomically};
+use mrt_core::container::{ContainerError, StagedFile};
 use mrt_runtime::low_level::level::text::MAX_TEXT_BYTES;
 use mrt_runtime::{Level, LevelTextError};
 use std::io::Read;
@@ -58,10 +58,17 @@ pub fn read_level(path: &Path) -> Result<Level, LevelFileError> {
 /// # Errors
 /// [`LevelFileError::Level`] and [`LevelFileError::Write`].
 pub fn write_level(path: &Path, level: &Level) -> Result<(), LevelFileError> {
+    Ok(stage_level(path, level)?.commit()?)
+}
+
+/// Writes a level beside its file, to be put in its place later.
+///
+/// # Errors
+/// [`LevelFileError::Level`] and [`LevelFileError::Write`].
+pub fn stage_level(path: &Path, level: &Level) -> Result<StagedFile, LevelFileError> {
     let text = level.to_text().map_err(|source| LevelFileError::Level {
         path: path.to_owned(),
         source,
     })?;
-    write_file_atomically(path, text.as_bytes())?;
-    Ok(())
+    Ok(StagedFile::write(path, text.as_bytes())?)
 }

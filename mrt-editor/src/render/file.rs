@@ -4,7 +4,7 @@ use super::picture::Picture;
 use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use mrt_core::container::{ContainerError, write_file_atomically};
+use mrt_core::container::{ContainerError, StagedFile};
 use std::path::{Path, PathBuf};
 
 /// Why a file could not be written.
@@ -57,10 +57,35 @@ pub enum Saves {
 /// [`WriteError`].
 pub fn write_png(
     path: &Path,
-    [width, height]: [usize; 2],
+    size: [usize; 2],
     srgb: &[u8],
     saves: Saves,
 ) -> Result<usize, WriteError> {
+    let bytes = png(path, size, srgb, saves)?;
+    StagedFile::write(path, &bytes)?.commit()?;
+    Ok(bytes.len())
+}
+
+/// Same as [`write_png`], beside the file, to be put in its place later.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn stage_png(
+    path: &Path,
+    size: [usize; 2],
+    srgb: &[u8],
+    saves: Saves,
+) -> Result<StagedFile, WriteError> {
+    Ok(StagedFile::write(path, &png(path, size, srgb, saves)?)?)
+}
+
+/// The bytes of a PNG file; an error names its path.
+fn png(
+    path: &Path,
+    [width, height]: [usize; 2],
+    srgb: &[u8],
+    saves: Saves,
+) -> Result<Vec<u8>, WriteError> {
     let compression = match saves {
         Saves::Time => CompressionType::Fast,
         Saves::Bytes => CompressionType::Best,
@@ -72,15 +97,15 @@ pub fn write_png(
             path: path.to_owned(),
             source,
         })?;
-    write_file_atomically(path, &bytes)?;
-    Ok(bytes.len())
+    Ok(bytes)
 }
 
-/// Writes linear pixels as Radiance HDR: each channel keeps 8 bits relative to the pixel's brightest one.
+/// Writes linear pixels as Radiance HDR, beside the file, to be put in its place later: each channel keeps 8 bits
+/// relative to the pixel's brightest one.
 ///
 /// # Errors
 /// [`WriteError`].
-pub fn write_hdr(path: &Path, picture: &Picture) -> Result<(), WriteError> {
+pub fn stage_hdr(path: &Path, picture: &Picture) -> Result<StagedFile, WriteError> {
     let mut bytes = Vec::new();
     let pixels = picture.pixels.iter();
     let pixels: Vec<_> = pixels.map(|colour| image::Rgb(colour.to_array())).collect();
@@ -90,5 +115,5 @@ pub fn write_hdr(path: &Path, picture: &Picture) -> Result<(), WriteError> {
             path: path.to_owned(),
             source,
         })?;
-    Ok(write_file_atomically(path, &bytes)?)
+    Ok(StagedFile::write(path, &bytes)?)
 }

@@ -11,5 +11,6 @@ mod demo;
 mod info;
 mod light;
 mod map;
+mod outputs;
 mod pack;
 mod usage;

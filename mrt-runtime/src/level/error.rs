@@ -159,12 +159,13 @@ pub enum LevelError {
         /// Largest distance between corners that should meet, metres.
         found: f64,
     },
-    /// The bounding boxes of blocks overlap so many others that a test of every pair would take too long.
+    /// The bounding boxes of blocks overlap so many others that telling whether the blocks do would take too long.
     #[error(
-        "blocks are packed so that each bounding box meets over {expected} others; expected fewer"
+        "blocks are packed so that telling whether they overlap takes over {expected} comparisons a block; \
+         expected fewer"
     )]
     TooCrowded {
-        /// Most pairs that are tested, for each block.
+        /// Most comparisons made, for each block.
         expected: usize,
     },
     /// A block is too far from the origin for positions in single precision.

@@ -28,12 +28,18 @@
 //! transport = "regathered"     # or "rebuilt": operators made for this warp
 //! ```
 
-use crate::level::block::{Block, Connection, Door, Level, MAX_BLOCKS, Opening};
+mod pieces;
+mod read;
+
+pub use pieces::MAX_PIECE_BYTES;
+
+use crate::level::block::{Block, Level, MAX_BLOCKS};
 use crate::level::error::LevelError;
 use crate::level::mesh_reading::{MeshReading, UpAxis};
 use crate::level::shape::{SHAPES, Shape};
 use crate::level::warp_transport::WarpTransport;
 use glam::{DVec3, Vec3};
+use mrt_core::excerpt::excerpt;
 use mrt_core::geometry::cube::{CubeRotation, Face};
 use mrt_core::geometry::hexahedron::Hexahedron;
 use serde::{Deserialize, Serialize};
@@ -56,6 +62,16 @@ pub enum LevelTextError {
         /// Most bytes accepted.
         expected: usize,
         /// Bytes of the text.
+        found: usize,
+    },
+    /// A part of the text is longer than [`MAX_PIECE_BYTES`].
+    #[error("the level text has {found} bytes in {place}; expected at most {expected}")]
+    PartTooLong {
+        /// Which part: a block, an element of a list, or what stands before the first block.
+        place: String,
+        /// Most bytes accepted.
+        expected: usize,
+        /// Bytes of the part.
         found: usize,
     },
     /// The text is not TOML, or a key is missing, unknown or of the wrong type.
@@ -131,26 +147,16 @@ pub enum LevelTextError {
     Level(#[from] LevelError),
 }
 
-#[derive(Deserialize)]
-struct Header {
-    #[serde(default)]
-    format: String,
-    #[serde(default)]
-    version: u32,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Serialize)]
 struct LevelText {
-    format: String,
+    format: &'static str,
     version: u32,
-    #[serde(default)]
-    connections: Vec<(usize, String, usize, String)>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    connections: Vec<(usize, &'static str, usize, &'static str)>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     doors: Vec<(usize, f32)>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     mesh: Option<MeshText>,
-    #[serde(default, rename = "block")]
+    #[serde(rename = "block")]
     blocks: Vec<BlockText>,
 }
 
@@ -200,6 +206,8 @@ impl Level {
     ///
     /// # Errors
     /// [`LevelTextError`]; with the line of the text where the parser knows it.
+    ///
+    /// Memory beyond that of the level stays below a few megabytes, however long the text is.
     pub fn from_text(text: &str) -> Result<Level, LevelTextError> {
         if text.len() > MAX_TEXT_BYTES {
             return Err(LevelTextError::TooLong {
@@ -207,52 +215,7 @@ impl Level {
                 found: text.len(),
             });
         }
-        let malformed = |error: toml::de::Error| LevelTextError::Malformed(one_line(text, &error));
-        // Format and version come first: another version may have keys that this one does not know.
-        let header: Header = toml::from_str(text).map_err(malformed)?;
-        if header.format != FORMAT {
-            return Err(LevelTextError::NotALevel {
-                found: header.format,
-            });
-        }
-        if header.version != LEVEL_VERSION {
-            return Err(LevelTextError::UnsupportedVersion {
-                found: header.version,
-            });
-        }
-        let text: LevelText = toml::from_str(text).map_err(malformed)?;
-        let blocks = text
-            .blocks
-            .iter()
-            .enumerate()
-            .map(|(index, block)| read_block(index, block))
-            .collect::<Result<_, _>>()?;
-        let connections = text
-            .connections
-            .iter()
-            .enumerate()
-            .map(|(index, (a, a_face, b, b_face))| {
-                let end = |block: usize, face: &str| {
-                    let face = read_face(face, || format!("connection {index}"))?;
-                    Ok::<_, LevelTextError>(Opening { block, face })
-                };
-                Ok(Connection {
-                    a: end(*a, a_face)?,
-                    b: end(*b, b_face)?,
-                })
-            })
-            .collect::<Result<_, LevelTextError>>()?;
-        let doors = text
-            .doors
-            .iter()
-            .map(|&(connection, value)| Door { connection, value })
-            .collect();
-        let level = Level {
-            blocks,
-            connections,
-            doors,
-            mesh: text.mesh.map(read_mesh).transpose()?,
-        };
+        let level = read::read(text)?;
         level.check()?;
         Ok(level)
     }
@@ -263,14 +226,14 @@ impl Level {
     /// [`LevelTextError::Malformed`], if TOML cannot represent a value.
     pub fn to_text(&self) -> Result<String, LevelTextError> {
         let text = LevelText {
-            format: FORMAT.to_owned(),
+            format: FORMAT,
             version: LEVEL_VERSION,
             connections: self
                 .connections
                 .iter()
                 .map(|c| {
-                    let name = |face: Face| face.name().to_owned();
-                    (c.a.block, name(c.a.face), c.b.block, name(c.b.face))
+                    let (a, b) = (c.a, c.b);
+                    (a.block, a.face.name(), b.block, b.face.name())
                 })
                 .collect(),
             doors: self
@@ -282,15 +245,6 @@ impl Level {
             blocks: self.blocks.iter().map(write_block).collect(),
         };
         toml::to_string(&text).map_err(|error| LevelTextError::Malformed(error.to_string()))
-    }
-}
-
-/// The parser's message with its line number, without the excerpt of several lines that the parser adds.
-fn one_line(text: &str, error: &toml::de::Error) -> String {
-    let message = error.message().trim().replace('\n', "; ");
-    match error.span().and_then(|span| text.get(..span.start)) {
-        Some(before) => format!("line {}: {message}", before.matches('\n').count() + 1),
-        None => message,
     }
 }
 
@@ -321,14 +275,14 @@ fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
     let shape = Shape::from_name(&text.shape).ok_or_else(|| LevelTextError::UnknownShape {
         block: index,
         expected: SHAPES.each_ref().map(|shape| shape.name).join(", "),
-        found: text.shape.clone(),
+        found: excerpt(&text.shape),
     })?;
     let orientation = match &text.orientation {
         None => CubeRotation::IDENTITY,
         Some(name) => {
             CubeRotation::from_name(name).ok_or_else(|| LevelTextError::UnknownOrientation {
                 block: index,
-                found: name.clone(),
+                found: excerpt(name),
             })?
         }
     };
@@ -362,7 +316,7 @@ fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
         block.transport =
             WarpTransport::from_name(name).ok_or_else(|| LevelTextError::UnknownTransport {
                 block: index,
-                found: name.clone(),
+                found: excerpt(name),
             })?;
     }
     Ok(block)
@@ -371,7 +325,7 @@ fn read_block(index: usize, text: &BlockText) -> Result<Block, LevelTextError> {
 fn read_face(name: &str, place: impl FnOnce() -> String) -> Result<Face, LevelTextError> {
     Face::from_name(name).ok_or_else(|| LevelTextError::UnknownFace {
         place: place(),
-        found: name.to_owned(),
+        found: excerpt(name),
     })
 }
 
@@ -419,6 +373,7 @@ fn write_block(block: &Block) -> BlockText {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::level::block::Door;
 
     fn sample() -> Level {
         let cells = [[0, 0, 0], [1, 0, 0], [1, 0, 1]];

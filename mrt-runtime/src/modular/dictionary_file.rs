@@ -31,7 +31,7 @@ mod write;
 
 pub use format::{
     DEFAULT_BYTE_BUDGET, DICTIONARY_VERSION, DictionaryError, MAX_MODES, MAX_PROBES,
-    MAX_RESOLUTION, MAX_VARIANTS,
+    MAX_RESOLUTION, MAX_TEXT_BYTES, MAX_VARIANTS,
 };
 
 use crate::modular::dictionary::{Dictionary, StoredDictionary};
@@ -83,6 +83,8 @@ impl Dictionary {
         let mut numbers = 0u64;
         stored.map(|_, matrix| numbers += matrix.rows() as u64 * matrix.columns() as u64);
         budget.spend("decoded matrices", size_of::<f32>() as u64 * numbers)?;
+        let text = stored.preset.len() + stored.settings.len();
+        budget.spend("text", text as u64)?;
         Ok(stored.decode())
     }
 }

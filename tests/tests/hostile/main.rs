@@ -4,3 +4,4 @@ mod dictionary_bytes;
 mod dictionary_sections;
 mod levels;
 mod reference_files;
+mod texts;

@@ -263,3 +263,58 @@ fn absurd_sizes_are_refused_before_anything_is_allocated() {
     let error = error_of(padded.as_bytes(), Some(&values(80)));
     assert!(matches!(error, ReferenceError::LimitExceeded { .. }));
 }
+
+#[test]
+fn a_file_of_many_cells_and_points_is_read_and_searched() {
+    // Near the limits of cells and of text.
+    let (side, count) = (64, 250_000);
+    let cells: Vec<[i32; 3]> = (0..side * side).map(|k| [k % side, 0, k / side]).collect();
+    let end = f64::from(side);
+    // On a face at the far end, so that a search of the list takes longest.
+    let points = vec![[end, 1.0, end]; count];
+    let description = json!({
+        "name": "level", "kind": "radiance_sh9", "cells": cells, "lights": [[end, 1.0, end]],
+        "intensity": 1.0, "albedo": 0.5, "terms": ["first_bounce", "albedo_0.5"], "points": points,
+        "shape": [1, 2, count, 9],
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let data = vec![0; 4 * 2 * 9 * count];
+    let text = description.to_string();
+    write(folder.path(), text.as_bytes(), Some(&data));
+    let file = read(&folder.path().join("level.json")).unwrap();
+    assert_eq!(file.light_cell(0).unwrap(), cells.len() - 1);
+    // Floors, ceilings, and the sides of the sheet.
+    assert_eq!(file.walls.len(), 2 * cells.len() + 4 * side as usize);
+    let hops = file.hops(0).unwrap();
+    assert_eq!(hops.iter().max(), Some(&(2 * (side as u32 - 1))));
+    let twice = description.to_string().replacen("[1,0,0]", "[63,0,63]", 1);
+    write(folder.path(), twice.as_bytes(), None);
+    let error = read(&folder.path().join("level.json")).unwrap_err();
+    assert!(error.to_string().contains("cell 4095"), "{error}");
+}
+
+#[test]
+fn what_a_description_says_is_quoted_shortly() {
+    let hostile = "\u{1b}[2J\u{202e}".repeat(4000);
+    for (key, value) in [
+        ("kind", json!(hostile)),
+        ("name", json!(hostile)),
+        ("walls", json!([[[0, 0, 0], hostile]])),
+        ("cells", json!([hostile])),
+        ("shape", json!(vec![1; 100_000])),
+    ] {
+        let error = error_of(&changed(key, value), Some(&values(80))).to_string();
+        assert!(!error.contains(char::is_control), "{error:?}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_no_reference_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("level.json");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let error = read(&path).unwrap_err();
+    assert!(error.to_string().contains("pipe"), "{error}");
+}

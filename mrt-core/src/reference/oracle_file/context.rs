@@ -1,6 +1,7 @@
 //! Errors that name the file they are about.
 
 use super::error::ReferenceError;
+use crate::excerpt::excerpt;
 use std::fmt::{Debug, Display};
 
 /// The path of the file that errors are about.
@@ -18,7 +19,7 @@ impl FileContext {
             file: self.0.clone(),
             what: what.to_string(),
             expected: expected.to_string(),
-            found: shortened(found.to_string()),
+            found: excerpt(&found.to_string()),
         }
     }
 
@@ -34,7 +35,7 @@ impl FileContext {
     pub(super) fn json(&self, error: &serde_json::Error) -> ReferenceError {
         ReferenceError::Json {
             file: self.0.clone(),
-            found: shortened(error.to_string()),
+            found: excerpt(&error.to_string()),
         }
     }
 
@@ -63,16 +64,6 @@ impl FileContext {
         }
         Err(self.malformed(what, "a number from 0 to 1", albedo))
     }
-}
-
-/// The start of a text: what a file holds may be megabytes long, and a message should not be.
-fn shortened(text: String) -> String {
-    const LONGEST: usize = 80;
-    if text.chars().count() <= LONGEST {
-        return text;
-    }
-    let start: String = text.chars().take(LONGEST).collect();
-    format!("{start}...")
 }
 
 /// Displays as `Debug` does: lists with brackets, text with quotes.

@@ -4,7 +4,7 @@ use super::context::{FileContext, Shown};
 use super::error::ReferenceError;
 use super::reference_file::Kind;
 use crate::geometry::cube::Face;
-use crate::reference::cells::{cell_of, neighbour_cell};
+use crate::reference::cells::CellIndex;
 use glam::DVec3;
 use serde::Deserialize;
 
@@ -37,31 +37,30 @@ pub(super) enum Albedo {
     PerWall(Vec<[f64; 3]>),
 }
 
-/// Checks cells, lights and the list of walls; returns the walls that the cells imply.
+/// Checks cells, lights and the list of walls; returns the cells' index and the walls that they imply.
 pub(super) fn check_level(
     file: &FileContext,
     parsed: &Description,
-) -> Result<Vec<(usize, Face)>, ReferenceError> {
+) -> Result<(CellIndex, Vec<(usize, Face)>), ReferenceError> {
     let cells = &parsed.cells;
     file.check_limit("the number of cells", cells.len() as u64, MAX_CELLS)?;
     if cells.is_empty() {
         return Err(file.malformed("cells", "at least one", "an empty list"));
     }
-    for (k, cell) in cells.iter().enumerate() {
-        for &x in cell {
-            let size = u64::from(x.unsigned_abs());
-            file.check_limit("a cell coordinate", size, MAX_COORDINATE)?;
-        }
-        if cells[..k].contains(cell) {
-            let what = format!("cell {k}");
-            return Err(file.malformed(what, "a cell not listed before", Shown(cell)));
-        }
+    for &x in cells.as_flattened() {
+        let size = u64::from(x.unsigned_abs());
+        file.check_limit("a cell coordinate", size, MAX_COORDINATE)?;
+    }
+    let (index, twice) = CellIndex::new(cells);
+    if let Some(k) = twice {
+        let what = format!("cell {k}");
+        return Err(file.malformed(what, "a cell not listed before", Shown(cells[k])));
     }
     if parsed.lights.is_empty() {
         return Err(file.malformed("lights", "at least one", "an empty list"));
     }
     for (k, &light) in parsed.lights.iter().enumerate() {
-        if cell_of(cells, DVec3::from_array(light)).is_none() {
+        if index.of_point(DVec3::from_array(light)).is_none() {
             let what = format!("light {k}");
             return Err(file.malformed(what, "a point inside a cell", Shown(light)));
         }
@@ -71,20 +70,18 @@ pub(super) fn check_level(
     }
     let implied: Vec<(usize, Face)> = (0..cells.len())
         .flat_map(|cell| Face::ALL.map(|face| (cell, face)))
-        .filter(|&(cell, face)| {
-            neighbour_cell(cells[cell], face).is_none_or(|across| !cells.contains(&across))
-        })
+        .filter(|&(cell, face)| index.across(cells[cell], face).is_none())
         .collect();
     if let Some(walls) = &parsed.walls {
-        check_walls(file, cells, walls, &implied)?;
+        check_walls(file, (cells, &index), walls, &implied)?;
     }
-    Ok(implied)
+    Ok((index, implied))
 }
 
 /// Checks that a file lists the walls that its cells imply, in the same order.
 fn check_walls(
     file: &FileContext,
-    cells: &[[i32; 3]],
+    (cells, index): (&[[i32; 3]], &CellIndex),
     walls: &[([i32; 3], String)],
     implied: &[(usize, Face)],
 ) -> Result<(), ReferenceError> {
@@ -93,7 +90,7 @@ fn check_walls(
         if Face::from_name(face).is_none() {
             return Err(file.malformed(what, "a face -x, +x, -y, +y, -z or +z", Shown(face)));
         }
-        if !cells.contains(cell) {
+        if index.position(*cell).is_none() {
             return Err(file.malformed(what, "a face of a listed cell", Shown(cell)));
         }
         match implied.get(k) {
@@ -115,12 +112,12 @@ fn check_walls(
 pub(super) fn check_kind(
     file: &FileContext,
     parsed: &Description,
-    walls: &[(usize, Face)],
+    (index, walls): (&CellIndex, &[(usize, Face)]),
 ) -> Result<(Kind, Vec<u64>), ReferenceError> {
     match parsed.kind.as_deref() {
         None | Some("irradiance") => check_irradiance(file, parsed, walls),
         Some("irradiance_rgb") => check_irradiance_rgb(file, parsed, walls),
-        Some("radiance_sh9") => check_radiance_sh9(file, parsed),
+        Some("radiance_sh9") => check_radiance_sh9(file, parsed, index),
         Some(other) => {
             let expected = "irradiance (or absent), irradiance_rgb or radiance_sh9";
             Err(file.malformed("kind", expected, Shown(other)))
@@ -168,6 +165,7 @@ fn check_irradiance_rgb(
 fn check_radiance_sh9(
     file: &FileContext,
     parsed: &Description,
+    index: &CellIndex,
 ) -> Result<(Kind, Vec<u64>), ReferenceError> {
     let Some(Albedo::Uniform(albedo)) = parsed.albedo else {
         return Err(file.malformed("albedo", "one number", "another form"));
@@ -180,7 +178,7 @@ fn check_radiance_sh9(
         _ => return Err(file.malformed("points", "at least one", "an empty list")),
     };
     for (k, &point) in points.iter().enumerate() {
-        if cell_of(&parsed.cells, point).is_none() {
+        if index.of_point(point).is_none() {
             let what = format!("point {k}");
             return Err(file.malformed(what, "a point inside a cell", point));
         }

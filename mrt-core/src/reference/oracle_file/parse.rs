@@ -4,6 +4,7 @@ use super::context::{FileContext, Shown};
 use super::description::{Description, check_kind, check_level};
 use super::error::ReferenceError;
 use super::reference_file::{Kind, ReferenceFile};
+use crate::container::place::check_plain;
 use glam::DVec3;
 use std::path::Path;
 
@@ -19,7 +20,7 @@ const MAX_VALUES: u64 = 64 << 20;
 pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
     let file = FileContext(description.display().to_string());
     let io = |source| file.io(source);
-    let size = std::fs::metadata(description).map_err(io)?.len();
+    let size = size_of_file(description).map_err(io)?;
     file.check_limit("the file size in bytes", size, MAX_JSON_BYTES)?;
     let text = std::fs::read(description).map_err(io)?;
     let parsed: Description = serde_json::from_slice(&text).map_err(|error| file.json(&error))?;
@@ -31,8 +32,8 @@ pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
             Shown(parsed.name),
         ));
     }
-    let walls = check_level(&file, &parsed)?;
-    let (kind, expected_shape) = check_kind(&file, &parsed, &walls)?;
+    let (index, walls) = check_level(&file, &parsed)?;
+    let (kind, expected_shape) = check_kind(&file, &parsed, (&index, &walls))?;
     if parsed.shape != expected_shape {
         return Err(file.malformed("shape", Shown(&expected_shape), Shown(&parsed.shape)));
     }
@@ -60,6 +61,13 @@ pub fn read(description: &Path) -> Result<ReferenceFile, ReferenceError> {
     })
 }
 
+/// Bytes of a plain file. A pipe has none, and reading it would wait until somebody writes to it.
+fn size_of_file(path: &Path) -> std::io::Result<u64> {
+    let found = std::fs::metadata(path)?;
+    check_plain(&found)?;
+    Ok(found.len())
+}
+
 /// Reads the numbers beside a description.
 fn read_values(path: &Path, count: u64, may_be_negative: bool) -> Result<Vec<f32>, ReferenceError> {
     let file = FileContext(path.display().to_string());
@@ -73,7 +81,7 @@ fn read_values(path: &Path, count: u64, may_be_negative: bool) -> Result<Vec<f32
     };
     // The size is checked before reading, so that a huge file costs nothing, and after, in case it
     // changed.
-    check_size(std::fs::metadata(path).map_err(io)?.len())?;
+    check_size(size_of_file(path).map_err(io)?)?;
     let bytes = std::fs::read(path).map_err(io)?;
     check_size(bytes.len() as u64)?;
     let (words, _) = bytes.as_chunks::<4>();

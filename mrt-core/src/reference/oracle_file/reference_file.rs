@@ -1,9 +1,10 @@
 //! A checked reference file, and the light that can be computed from it.
 
 use super::error::ReferenceError;
+use crate::excerpt::excerpt;
 use crate::geometry::cube::Face;
 use crate::reference::bounces::ReferenceBounces;
-use crate::reference::cells::{cell_hops, cell_of};
+use crate::reference::cells::{CellIndex, cell_hops};
 use glam::DVec3;
 
 /// Reflections in the last term of an `irradiance_rgb` file. The file names that term `all_bounces`.
@@ -177,7 +178,8 @@ impl ReferenceFile {
     /// [`ReferenceError::NotInFile`] if the light does not exist.
     pub fn light_cell(&self, light: usize) -> Result<usize, ReferenceError> {
         let position = self.lights.get(light).copied();
-        let cell = position.and_then(|position| cell_of(&self.cells, position));
+        let (index, _) = CellIndex::new(&self.cells);
+        let cell = position.and_then(|position| index.of_point(position));
         cell.ok_or_else(|| {
             let found = format!("{} lights", self.lights.len());
             self.lacks(format!("light {light}"), found)
@@ -198,7 +200,7 @@ impl ReferenceFile {
         ReferenceError::NotInFile {
             file: self.name.clone(),
             what,
-            found,
+            found: excerpt(&found),
         }
     }
 

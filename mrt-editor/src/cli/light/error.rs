@@ -4,6 +4,7 @@ use crate::cli::dictionary_source::SourceError;
 use crate::cli::hint::after_assembly;
 use crate::cli::import_args::{ReadingMismatch, import_hint};
 use crate::cli::output::ReportError;
+use crate::cli::output_files::OutputError;
 use crate::document::level_file::LevelFileError;
 use crate::import::error::ImportError;
 use crate::render::file::WriteError;
@@ -22,6 +23,9 @@ pub enum LightCommandError {
         /// The input in it.
         input: PathBuf,
     },
+    /// The output folder is refused.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// The mesh does not lie where the level is.
     #[error(
         "level {}: {:.1} % of the mesh's area lies in or near a block; expected at least {:.0} % (is it this \

@@ -2,16 +2,16 @@
 
 use super::report::in_mesh;
 use super::view::View;
-use crate::render::file::{Saves, WriteError, make_folder, write_hdr, write_png};
+use crate::render::file::{Saves, WriteError, make_folder, stage_hdr, stage_png};
 use crate::render::lit::LitScene;
 use crate::render::picture::Picture;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::{DVec3, Vec3};
-use mrt_core::container::write_file_atomically;
+use mrt_core::container::StagedFile;
 use mrt_runtime::low_level::output::receiver::UnwrappedTriangle;
 use std::collections::HashMap;
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The mesh with its lightmap coordinates.
 pub(super) struct Unwrapped<'a> {
@@ -20,49 +20,39 @@ pub(super) struct Unwrapped<'a> {
     pub(super) origin: DVec3,
 }
 
-/// Writes into a temporary folder beside `folder` first, and moves the files once all are there.
+/// Writes all files beside their places first, and puts them there once all are on the disk.
 pub(super) fn write(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
     unwrapped: &Unwrapped<'_>,
 ) -> Result<(), WriteError> {
-    let mut name = folder.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = folder.with_file_name(name);
-    let write = || {
-        make_folder(&part)?;
-        let files = write_files(&part, views, lit, unwrapped)?;
-        make_folder(folder)?;
-        for file in files {
-            let path = folder.join(&file);
-            let moved = std::fs::rename(part.join(&file), &path);
-            moved.map_err(|source| WriteError::Io { path, source })?;
-        }
-        Ok(())
-    };
-    let result = write();
-    // It is empty by now, or its files are not wanted; the result says whether all went well.
-    let _ = std::fs::remove_dir_all(&part);
+    let is_new = !folder.exists();
+    make_folder(folder)?;
+    let result = stage_files(folder, views, lit, unwrapped).and_then(|files| {
+        let mut files = files.into_iter();
+        files.try_for_each(|file| Ok(file.commit()?))
+    });
+    if result.is_err() && is_new {
+        // Only an empty folder goes. An error is ignored: the first one says more.
+        let _ = std::fs::remove_dir(folder);
+    }
     result
 }
 
-fn write_files(
+fn stage_files(
     folder: &Path,
     views: &[View],
     lit: &LitScene<'_>,
     unwrapped: &Unwrapped<'_>,
-) -> Result<Vec<PathBuf>, WriteError> {
+) -> Result<Vec<StagedFile>, WriteError> {
     let mut files = Vec::new();
-    let mut name = |file: String| {
-        files.push(PathBuf::from(&file));
-        folder.join(file)
-    };
     for view in views {
         for (picture, suffix) in view.pictures.iter().zip(["-direct", "-indirect", ""]) {
-            let path = name(format!("{}{suffix}.png", view.name));
+            let path = folder.join(format!("{}{suffix}.png", view.name));
+            let size = [picture.width, picture.height];
             let pixels = tone_map(picture, view.exposure);
-            write_png(&path, [picture.width, picture.height], &pixels, Saves::Time)?;
+            files.push(stage_png(&path, size, &pixels, Saves::Time)?);
         }
     }
     let lightmap = Picture {
@@ -72,12 +62,13 @@ fn write_files(
     };
     let size = [lightmap.width, lightmap.height];
     let pixels = tone_map(&lightmap, auto_exposure(&[&lightmap]));
-    write_png(&name("lightmap.png".to_owned()), size, &pixels, Saves::Time)?;
-    write_hdr(&name("lightmap.hdr".to_owned()), &lightmap)?;
+    let path = folder.join("lightmap.png");
+    files.push(stage_png(&path, size, &pixels, Saves::Time)?);
+    files.push(stage_hdr(&folder.join("lightmap.hdr"), &lightmap)?);
     let obj = obj_text(lit, unwrapped);
-    write_file_atomically(&name("mesh.obj".to_owned()), obj.as_bytes())?;
+    files.push(StagedFile::write(&folder.join("mesh.obj"), obj.as_bytes())?);
     let mtl = mtl_text(lit);
-    write_file_atomically(&name("mesh.mtl".to_owned()), mtl.as_bytes())?;
+    files.push(StagedFile::write(&folder.join("mesh.mtl"), mtl.as_bytes())?);
     Ok(files)
 }
 

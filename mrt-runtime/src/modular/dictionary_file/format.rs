@@ -3,6 +3,7 @@
 use crate::level::shape::{SHAPES, Shape};
 use crate::modular::dictionary::OperatorKind;
 use mrt_core::container::{ByteBudget, Container, ContainerError, Format};
+use mrt_core::excerpt::excerpt;
 use mrt_core::storage::{StoredMatrix, StoredSection, read_stored};
 
 /// The version that is written, and the newest that is read.
@@ -19,6 +20,9 @@ pub const MAX_PROBES: usize = 16;
 
 /// Largest accepted number of modes of any kind.
 pub const MAX_MODES: usize = 4096;
+
+/// Most bytes accepted of the preset's name, and of the settings; those of a bake take under a thousand.
+pub const MAX_TEXT_BYTES: u64 = 1 << 16;
 
 /// Largest accepted number of variants.
 pub const MAX_VARIANTS: usize = 512;
@@ -155,6 +159,21 @@ impl<'a> Source<'a, '_, '_> {
         Ok(self.container.finite_numbers(section, self.budget)?)
     }
 
+    /// A copy of a section of text, of [`MAX_TEXT_BYTES`] at most.
+    pub(super) fn owned_text(&mut self, section: &str) -> Result<String, DictionaryError> {
+        let text = self.container.text(section)?;
+        let found = text.len() as u64;
+        if found > MAX_TEXT_BYTES {
+            return Err(DictionaryError::Container(ContainerError::LimitExceeded {
+                what: "text",
+                limit: MAX_TEXT_BYTES,
+                found,
+            }));
+        }
+        self.budget.spend("text", found)?;
+        Ok(text.to_owned())
+    }
+
     /// A section of exactly `N` sizes.
     pub(super) fn sizes<const N: usize>(
         &mut self,
@@ -212,7 +231,7 @@ pub(super) fn known_shape(index: usize, name: &str) -> Result<&'static Shape, Di
     Shape::from_name(name).ok_or_else(|| DictionaryError::UnknownShape {
         index,
         expected: SHAPES.each_ref().map(|shape| shape.name).join(", "),
-        found: name.chars().take(32).collect(),
+        found: excerpt(name),
     })
 }
 

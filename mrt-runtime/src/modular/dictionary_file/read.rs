@@ -11,6 +11,7 @@ use crate::modular::dictionary_file::format::{
     known_shape,
 };
 use crate::modular::path::{MAX_WORD, Word};
+use mrt_core::excerpt::excerpt;
 use mrt_core::storage::StoredMatrix;
 
 type Operators<'a> = ShapeOperators<StoredMatrix<'a>>;
@@ -52,8 +53,8 @@ pub(super) fn read<'a>(
         None
     };
     Ok(StoredDictionary {
-        preset: container.text("preset")?.to_owned(),
-        settings: container.text("settings")?.to_owned(),
+        preset: source.owned_text("preset")?,
+        settings: source.owned_text("settings")?,
         resolution: sizes.resolution,
         probes: sizes.probes,
         shapes,
@@ -191,7 +192,7 @@ fn read_paths<'a>(
             .filter(|word| entries.last().is_none_or(|last| last.word < *word))
             .ok_or_else(|| DictionaryError::Word {
                 index,
-                found: name.chars().take(32).collect(),
+                found: excerpt(name),
             })?;
         let matrix = source.matrix(OperatorKind::Path, &format!("P{index}"), size)?;
         entries.push(PathEntry {
@@ -224,7 +225,7 @@ fn read_variants<'a>(
     let mut variants = Vec::with_capacity(sizes.variants);
     for (index, name) in names.into_iter().enumerate() {
         let (transport, shape) = variant_of_name(name, shapes).ok_or_else(|| {
-            let found = name.chars().take(32).collect();
+            let found = excerpt(name);
             DictionaryError::Variant { index, found }
         })?;
         let corner = |k: usize| std::array::from_fn(|axis| corners[24 * index + 3 * k + axis]);

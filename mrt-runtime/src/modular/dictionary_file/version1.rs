@@ -67,8 +67,8 @@ pub(super) fn read<'a>(
         shapes.push(entry);
     }
     Ok(StoredDictionary {
-        preset: source.container.text("preset")?.to_owned(),
-        settings: source.container.text("settings")?.to_owned(),
+        preset: source.owned_text("preset")?,
+        settings: source.owned_text("settings")?,
         resolution,
         probes: 0,
         shapes,
