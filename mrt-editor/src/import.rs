@@ -55,7 +55,31 @@ pub struct ImportedScene {
 /// [`ImportError`]; faulty triangles are no error as long as one is good.
 pub fn read_scene(path: &Path, config: &ImportConfig) -> Result<ImportedScene, ImportError> {
     check(config)?;
-    let raw = read_raw(path)?;
+    let read = reader(path)?;
+    scene_of(path, read(path, &read_file(path)?)?, config)
+}
+
+/// Same as [`read_scene`], from the bytes of a file that need not exist. Files that the scene names are looked for in the
+/// folder of `path`.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_scene_bytes(
+    path: &Path,
+    bytes: &[u8],
+    config: &ImportConfig,
+) -> Result<ImportedScene, ImportError> {
+    check(config)?;
+    let read = reader(path)?;
+    scene_of(path, read(path, bytes)?, config)
+}
+
+/// Brings a mesh to metres and tidies it.
+fn scene_of(
+    path: &Path,
+    raw: RawMesh,
+    config: &ImportConfig,
+) -> Result<ImportedScene, ImportError> {
     let (mesh, report) = tidy(path, raw, config)?;
     check_extent(path, &mesh)?;
     Ok(ImportedScene { mesh, report })
@@ -72,19 +96,20 @@ fn check(config: &ImportConfig) -> Result<(), ImportError> {
     }
 }
 
-fn read_raw(path: &Path) -> Result<RawMesh, ImportError> {
+/// Reads the bytes of a file with this path.
+type Reader = fn(&Path, &[u8]) -> Result<RawMesh, ImportError>;
+
+/// The reader for files whose name ends so.
+fn reader(path: &Path) -> Result<Reader, ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let read = match ending.to_ascii_lowercase().as_str() {
-        "obj" => obj::read,
-        "glb" => glb::read,
-        _ => {
-            return Err(ImportError::UnknownFormat {
-                path: path.to_owned(),
-                found: ending.into_owned(),
-            });
-        }
-    };
-    read(path, &read_file(path)?)
+    match ending.to_ascii_lowercase().as_str() {
+        "obj" => Ok(obj::read),
+        "glb" => Ok(glb::read),
+        _ => Err(ImportError::UnknownFormat {
+            path: path.to_owned(),
+            found: ending.into_owned(),
+        }),
+    }
 }
 
 /// Scales and turns the mesh, and leaves out what cannot be lit.
