@@ -5,6 +5,7 @@ use crate::random::Random;
 use mrt_editor::import::limits::MAX_COORDINATE_M;
 use mrt_editor::import::{ImportConfig, UpAxis, read_scene_bytes};
 use std::path::Path;
+use tempfile::TempDir;
 
 /// An OBJ file, or an OBJ file, a zero byte, and the library `m.mtl` that it may name.
 pub const OBJ: Target = Target {
@@ -149,9 +150,14 @@ pub fn run_obj(bytes: &[u8]) {
     let Some(split) = bytes.iter().position(|&byte| byte == 0) else {
         return read(Path::new("/no-such-folder/scene.obj"), bytes);
     };
-    let folder = tempfile::tempdir().expect("a folder");
-    std::fs::write(folder.path().join("m.mtl"), &bytes[split + 1..]).expect("writes");
-    read(&folder.path().join("scene.obj"), &bytes[..split]);
+    thread_local! {
+        // Making a folder takes longer than reading a small mesh.
+        static FOLDER: TempDir = tempfile::tempdir().expect("a folder");
+    }
+    FOLDER.with(|folder| {
+        std::fs::write(folder.path().join("m.mtl"), &bytes[split + 1..]).expect("writes");
+        read(&folder.path().join("scene.obj"), &bytes[..split]);
+    });
 }
 
 /// Reads a GLB file, or text as a glTF file.
