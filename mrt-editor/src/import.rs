@@ -53,22 +53,39 @@ pub struct ImportedScene {
 /// [`ImportError`]; faulty triangles are no error as long as one is good.
 pub fn read_scene(path: &Path, config: &ImportConfig) -> Result<ImportedScene, ImportError> {
     config.check()?;
-    tidy(path, read_raw(path)?, config)
+    let read = reader(path)?;
+    tidy(path, read(path, &read_file(path)?)?, config)
 }
 
-fn read_raw(path: &Path) -> Result<RawMesh, ImportError> {
+/// Same as [`read_scene`], from the bytes of a file that need not exist. Files that the scene names are looked for in the
+/// folder of `path`.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_scene_bytes(
+    path: &Path,
+    bytes: &[u8],
+    config: &ImportConfig,
+) -> Result<ImportedScene, ImportError> {
+    config.check()?;
+    let read = reader(path)?;
+    tidy(path, read(path, bytes)?, config)
+}
+
+/// Reads the bytes of a file with this path.
+type Reader = fn(&Path, &[u8]) -> Result<RawMesh, ImportError>;
+
+/// The reader for files whose name ends so.
+fn reader(path: &Path) -> Result<Reader, ImportError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy();
-    let read = match ending.to_ascii_lowercase().as_str() {
-        "obj" => obj::read,
-        "glb" | "gltf" => gltf::read,
-        _ => {
-            return Err(ImportError::UnknownFormat {
-                path: path.to_owned(),
-                found: ending.into_owned(),
-            });
-        }
-    };
-    read(path, &read_file(path)?)
+    match ending.to_ascii_lowercase().as_str() {
+        "obj" => Ok(obj::read),
+        "glb" | "gltf" => Ok(gltf::read),
+        _ => Err(ImportError::UnknownFormat {
+            path: path.to_owned(),
+            found: ending.into_owned(),
+        }),
+    }
 }
 
 /// Scales, turns and moves the mesh, and leaves out what is not wanted and what cannot be lit.

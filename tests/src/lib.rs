@@ -1,7 +1,8 @@
 //! What tests share.
 //!
 //! Dictionaries and bakes, levels by floor plan or at random, frames in a call, irradiance by texel, what frames are
-//! compared with, [`tunnels`], meshes, checks of beams ([`beam_check`]) and of [`warped`] blocks.
+//! compared with, [`tunnels`], meshes, checks of beams ([`beam_check`]) and of [`warped`] blocks, and what readers are
+//! tried with ([`harness`]).
 
 mod random;
 mod threads;
@@ -17,6 +18,7 @@ mod meshes;
 pub mod tunnels;
 pub mod beam_check;
 pub mod warped;
+pub mod harness;
 
 pub use dictionaries::*;
 pub use flux::Flux;

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 
 pub use error::ReferenceError;
 pub use folder::ground_truth_folder;
-pub use parse::read;
+pub use parse::{from_bytes, read};
 pub use reference_file::{Kind, PROBE_BOUNCES, RGB_BOUNCES, ReferenceFile};
 
 /// Reference files of white walls and flat levels, which every set of shapes can build.

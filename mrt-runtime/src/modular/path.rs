@@ -132,12 +132,16 @@ impl Word {
                 'y' if word.uses(Face::PosX) => Face::PosY,
                 _ => return None,
             };
+            // A name from a hostile file may be as long as the file.
+            if word.0.len() == MAX_WORD {
+                return None;
+            }
             word.0.push(Crossing {
                 heading,
                 hole: None,
             });
         }
-        (1..=MAX_WORD).contains(&word.0.len()).then_some(word)
+        (!word.0.is_empty()).then_some(word)
     }
 
     /// The cell, relative to the emitter's, that the path is in after each crossing.

@@ -68,6 +68,7 @@ fn is_path(text: &str) -> bool {
         "docs/",
         "assets/",
         "benches/",
+        "fuzz/",
         ".ci/",
     ];
     text.contains('/')

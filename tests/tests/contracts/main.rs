@@ -6,6 +6,7 @@ mod documents;
 mod doors;
 mod facade;
 mod frame;
+mod licences;
 mod lightmap;
 mod old_versions;
 mod opening_responses;
