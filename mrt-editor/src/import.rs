@@ -7,7 +7,7 @@ pub mod error;
 pub mod config;
 mod file;
 mod neighbour;
-mod raw_mesh;
+pub(crate) mod raw_mesh;
 mod gltf;
 mod obj;
 mod texture;
@@ -116,13 +116,14 @@ fn tidy(
         return Err(empty());
     }
     drop(untidy);
-    let (colours, made_up) = match config.albedo {
+    let (mut colours, made_up) = match config.albedo {
         Some(albedo) => {
             let colours = SurfaceColours::uniform(albedo, &raw.paints);
             (colours, MadeUp::default())
         }
         None => SurfaceColours::new(&raw, &mesh, &kept),
     };
+    colours.keep_files(std::mem::take(&mut raw.images));
     colours.paint_materials(&mut mesh);
     let lights = place_lamps(&mut raw, &level_from_file);
     let mut report = ImportReport {

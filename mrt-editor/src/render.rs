@@ -1,6 +1,7 @@
 //! Pictures: a pinhole camera, one colour for every ray, tone mapping, files.
 
 pub mod camera;
+pub mod ktx2;
 pub mod file;
 pub mod lamp;
 pub mod level_view;

@@ -10,9 +10,12 @@ const MAX_LINKS: usize = 40;
 /// The path after all symbolic links of its last part: that of a file, or of where one would be made.
 ///
 /// # Errors
-/// Those of the system; a path that names no file but a folder, as `a/` and `a/..` do; and links in a circle.
+/// Those of the system; a path that names no file but a folder, as `a/` and `a/..` do; links in a circle; and as
+/// [`check_is_file`].
 pub fn target_of(path: &Path) -> io::Result<PathBuf> {
     check_name(path)?;
+    // The system follows links that have no path, such as standard output's to a pipe.
+    check_is_file(path)?;
     let mut target = path.to_owned();
     for _ in 0..MAX_LINKS {
         match fs::symlink_metadata(&target) {

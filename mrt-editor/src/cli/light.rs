@@ -2,6 +2,7 @@
 
 mod args;
 mod error;
+mod glb;
 mod output;
 mod places;
 mod report;

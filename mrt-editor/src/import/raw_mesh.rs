@@ -54,7 +54,7 @@ pub(super) struct PaintImage {
 
 /// What stands beyond an image's edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Wrap {
+pub(crate) enum Wrap {
     #[default]
     Repeat,
     Mirror,
@@ -62,7 +62,7 @@ pub(super) enum Wrap {
 }
 
 /// An image as its file has it: PNG, JPEG or WebP.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct RawImage {
     /// Its file's name, or its place in the scene's file; for messages.
     pub(super) name: String,

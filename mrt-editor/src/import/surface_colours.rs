@@ -1,7 +1,7 @@
 //! What colour a mesh has at each point: base colours times vertex colours times images.
 
 use super::limits::{ALBEDO_RANGE, UNSTATED_ALBEDO};
-use super::raw_mesh::{Paint, PaintImage, RawMesh, Wrap};
+use super::raw_mesh::{Paint, PaintImage, RawImage, RawMesh, Wrap};
 use super::texture::{Texture, longest_side};
 use glam::{Vec2, Vec3};
 use mrt_core::geometry::mesh::{Kept, TriangleMesh};
@@ -20,17 +20,22 @@ pub struct SurfaceColours {
     /// By material.
     paints: Vec<SurfacePaint>,
     textures: Vec<Texture>,
+    /// The file of each texture, to be written again.
+    files: Vec<RawImage>,
+    /// For each texture, which of the scene's images it is.
+    image_of_texture: Vec<usize>,
     /// Into which mean albedos of walls are moved.
     albedo_range: [f32; 2],
 }
 
 /// What covers a material's triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct SurfacePaint {
-    colour: Vec3,
+pub(crate) struct SurfacePaint {
+    pub(crate) colour: Vec3,
     /// Index into the textures, and what stands beyond its edges.
-    texture: Option<(usize, [Wrap; 2])>,
-    emission: Vec3,
+    pub(crate) texture: Option<(usize, [Wrap; 2])>,
+    /// Radiance, linear RGB, W/(m² sr).
+    pub(crate) emission: Vec3,
 }
 
 /// A point of a triangle.
@@ -62,6 +67,8 @@ impl SurfaceColours {
             corner_uvs: Vec::new(),
             paints: Vec::new(),
             textures: Vec::new(),
+            files: Vec::new(),
+            image_of_texture: Vec::new(),
             albedo_range: ALBEDO_RANGE,
         }
     }
@@ -163,6 +170,7 @@ impl SurfaceColours {
                     Ok(texture) => {
                         texture_of_image[k] = Some(self.textures.len());
                         self.textures.push(texture);
+                        self.image_of_texture.push(k);
                     }
                     Err(reason) => made_up.warnings.push(format!(
                         "material `{}`: image `{}` cannot be read ({reason}); expected a sound PNG, JPEG or WebP. It \
@@ -174,6 +182,33 @@ impl SurfaceColours {
         }
         made_up.images = self.textures.len();
         texture_of_image
+    }
+
+    /// Keeps the files of the textures, out of all images of the scene.
+    pub(super) fn keep_files(&mut self, mut images: Vec<RawImage>) {
+        let files = self.image_of_texture.iter();
+        self.files = files.map(|&k| std::mem::take(&mut images[k])).collect();
+    }
+
+    /// What covers a material's triangles.
+    pub(crate) fn paint(&self, material: usize) -> SurfacePaint {
+        self.paints[material]
+    }
+
+    /// The file of a texture, as the scene has it; `None` if it was not kept.
+    pub(crate) fn file(&self, texture: usize) -> Option<&[u8]> {
+        self.files.get(texture).map(|file| file.bytes.as_slice())
+    }
+
+    /// A triangle's corners in its image.
+    pub(crate) fn corner_uvs(&self, triangle: usize) -> Option<[Vec2; 3]> {
+        self.corner_uvs.get(triangle).copied()
+    }
+
+    /// The factors at a triangle's corners.
+    pub(crate) fn corner_colours(&self, mesh: &TriangleMesh, triangle: usize) -> Option<[Vec3; 3]> {
+        let colour = |v: u32| self.vertex_colours[v as usize];
+        (!self.vertex_colours.is_empty()).then(|| mesh.triangles[triangle].map(colour))
     }
 
     /// Materials of which a vertex has another colour than white, which readers give to vertices without one.

@@ -1,5 +1,6 @@
 //! Pictures as files, which are there whole or not at all.
 
+use super::ktx2::ktx2_bytes;
 use super::picture::Picture;
 use image::codecs::hdr::HdrEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -98,6 +99,14 @@ fn png(
             source,
         })?;
     Ok(bytes)
+}
+
+/// Writes linear pixels as KTX2, in half precision, beside the file, to be put in its place later.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn stage_ktx2(path: &Path, picture: &Picture) -> Result<StagedFile, WriteError> {
+    Ok(StagedFile::write(path, &ktx2_bytes(picture))?)
 }
 
 /// Writes linear pixels as Radiance HDR, beside the file, to be put in its place later: each channel keeps 8 bits

@@ -1,8 +1,9 @@
 //! The files that `mrt light` leaves: all of them, or none.
 
+use super::glb::glb_bytes;
 use super::report::in_mesh;
 use super::view::View;
-use crate::render::file::{Saves, WriteError, make_folder, stage_hdr, stage_png};
+use crate::render::file::{Saves, WriteError, make_folder, stage_hdr, stage_ktx2, stage_png};
 use crate::render::lit::LitScene;
 use crate::render::picture::Picture;
 use crate::render::tone::{auto_exposure, tone_map};
@@ -65,10 +66,13 @@ fn stage_files(
     let path = folder.join("lightmap.png");
     files.push(stage_png(&path, size, &pixels, Saves::Time)?);
     files.push(stage_hdr(&folder.join("lightmap.hdr"), &lightmap)?);
+    files.push(stage_ktx2(&folder.join("lightmap.ktx2"), &lightmap)?);
     let obj = obj_text(lit, unwrapped);
     files.push(StagedFile::write(&folder.join("mesh.obj"), obj.as_bytes())?);
     let mtl = mtl_text(lit);
     files.push(StagedFile::write(&folder.join("mesh.mtl"), mtl.as_bytes())?);
+    let glb = glb_bytes(lit, unwrapped);
+    files.push(StagedFile::write(&folder.join("mesh.glb"), &glb)?);
     Ok(files)
 }
 
