@@ -1,21 +1,14 @@
 //! Public bug reports about colours, lamps, emission and materials that are left out; and meshes far from their origin.
 
-use crate::common::{ROOM_LEVEL, ROOM_OBJ, assert_refused, folder, json, mrt, text};
-use mrt_core::reference::oracle_file::ground_truth_folder;
+use crate::common::{ROOM_LEVEL, ROOM_OBJ, assert_refused, case, folder, json, mrt, text};
 use serde_json::Value;
 use std::ffi::OsString;
 use std::fs;
 use tempfile::TempDir;
 
-/// A file of a case.
-fn case(path: &str) -> OsString {
-    let folder = ground_truth_folder("cases").expect("shared/cases exists");
-    folder.join(path).into_os_string()
-}
-
 /// The report of `mrt map` on a case.
 fn mapped(folder: &TempDir, scene: &str, more: &[&str]) -> Value {
-    let mut arguments: Vec<OsString> = vec!["map".into(), "--scene".into(), case(scene)];
+    let mut arguments: Vec<OsString> = vec!["map".into(), "--scene".into(), case(scene).into()];
     arguments.extend(["--out", "l.toml", "--json"].map(OsString::from));
     arguments.extend(more.iter().map(OsString::from));
     json(&mrt(folder, &arguments))
@@ -23,7 +16,7 @@ fn mapped(folder: &TempDir, scene: &str, more: &[&str]) -> Value {
 
 /// The report of `mrt light` on a case in the level just mapped.
 fn lit(folder: &TempDir, scene: &str, more: &[&str]) -> Value {
-    let mut arguments: Vec<OsString> = vec!["light".into(), "--scene".into(), case(scene)];
+    let mut arguments: Vec<OsString> = vec!["light".into(), "--scene".into(), case(scene).into()];
     let usual = [
         "--level", "l.toml", "--out", "o", "--json", "--size", "160x90",
     ];

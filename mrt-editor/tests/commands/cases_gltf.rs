@@ -1,7 +1,6 @@
 //! `mrt map` on the public cases of glTF.
 
-use crate::common::{assert_refused, folder, json, mrt, text};
-use mrt_core::reference::oracle_file::ground_truth_folder;
+use crate::common::{self, assert_refused, folder, json, mrt, text};
 use serde_json::Value;
 use std::fs;
 use std::process::Output;
@@ -9,12 +8,10 @@ use tempfile::TempDir;
 
 /// Runs `mrt map` on a case; the level becomes `l.toml` in `folder`.
 fn map(folder: &TempDir, case: &str) -> Output {
-    let cases = ground_truth_folder("cases").expect("the folder of cases");
-    let scene = cases.join(case);
-    let scene = scene.to_str().expect("a name of text");
+    let scene = common::case(case);
     mrt(
         folder,
-        &["map", "--scene", scene, "--out", "l.toml", "--json"],
+        &["map", "--scene", &scene, "--out", "l.toml", "--json"],
     )
 }
 
@@ -80,8 +77,7 @@ fn what_cannot_be_read_is_refused_in_one_sentence() {
 #[test]
 fn a_missing_buffer_is_named() {
     let folder = folder();
-    let cases = ground_truth_folder("cases").expect("the folder of cases");
-    let scene = cases.join("08-gltf-json/external.gltf");
+    let scene = common::case("08-gltf-json/external.gltf");
     fs::copy(scene, folder.path().join("external.gltf")).expect("writable");
     let arguments = ["map", "--scene", "external.gltf", "--out", "l.toml"];
     assert_refused(&mrt(&folder, &arguments), "room data.bin");

@@ -1,18 +1,11 @@
 //! OBJ files after public bug reports, with what is right for each.
 
-use crate::common::{folder, json, mrt, text};
+use crate::common::{case, folder, json, mrt, text};
 use glam::{DVec3, Vec3};
 use mrt_runtime::Level;
 use serde_json::Value;
 use std::fs;
 use tempfile::TempDir;
-
-/// A file of the ground truth's cases.
-fn case(name: &str) -> String {
-    let cases = mrt_core::reference::oracle_file::ground_truth_folder("cases");
-    let path = cases.expect("a folder of cases").join(name);
-    path.into_os_string().into_string().expect("a plain path")
-}
 
 /// Maps `scene`; returns the report and the level.
 fn map(folder: &TempDir, scene: &str, more: &[&str]) -> (Value, Level) {
@@ -133,8 +126,5 @@ fn a_pipe_as_a_library_is_not_waited_for() {
     let error = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{error}");
     assert!(!error.contains("panicked"), "{error}");
-    assert!(
-        error.contains("library fifo is no regular file"),
-        "{error}"
-    );
+    assert!(error.contains("library fifo is no regular file"), "{error}");
 }

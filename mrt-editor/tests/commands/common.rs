@@ -1,5 +1,6 @@
 //! Running the program, and what it is run on.
 
+use mrt_core::reference::oracle_file::ground_truth_folder;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;
@@ -112,4 +113,11 @@ pub fn bad_meshes() -> Vec<(&'static str, Vec<u8>)> {
         ("truncated.glb", b"glTF\x02\0\0\0\xff\xff\0\0".to_vec()),
         ("picture.png", b"\x89PNG\r\n\x1a\n".to_vec()),
     ]
+}
+
+/// The path of a file of `shared/cases`. Tests that need one are ignored where the folder is absent.
+pub fn case(name: &str) -> String {
+    let cases = ground_truth_folder("cases").expect("shared/cases exists");
+    let path = cases.join(name).into_os_string();
+    path.into_string().expect("a path of text")
 }
