@@ -37,6 +37,7 @@ fn a_room_becomes_one_closed_block_however_its_file_stores_it() {
     ] {
         let (level, report) = mapped(case);
         assert_eq!(report["blocks"], 1, "{case}: {report}");
+        assert_eq!(report["mesh"]["triangles"], 12, "{case}: {report}");
         assert!(level.contains("shape = \"closed\""), "{case}: {level}");
     }
 }
@@ -44,9 +45,14 @@ fn a_room_becomes_one_closed_block_however_its_file_stores_it() {
 #[cfg_attr(not(has_cases), ignore = "the folder of cases is not there")]
 #[test]
 fn mirrors_and_instances_make_the_blocks_that_they_show() {
-    let (level, report) = mapped("05-mirrored-node/half-mirrored.glb");
-    assert_eq!(report["blocks"], 3, "{report}");
-    assert_eq!(report["connections"], 2, "{level}");
+    let (_, report) = mapped("05-mirrored-node/half-mirrored.glb");
+    assert_eq!(report["mesh"]["triangles"], 20, "{report}");
+    assert_eq!(
+        (&report["blocks"], &report["connections"]),
+        (&3.into(), &2.into()),
+        "{report}"
+    );
+    assert_eq!(report["area_share"]["inside"], 1.0, "{report}");
     let (level, report) = mapped("19-ignored-content/instancing.glb");
     assert_eq!(report["blocks"], 2, "{report}");
     assert_eq!(level.matches("shape = \"closed\"").count(), 2, "{level}");
