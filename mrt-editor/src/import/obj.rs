@@ -18,7 +18,7 @@ use super::error::ImportError;
 use super::file::SceneFolder;
 use super::limits::{MAX_LIBRARIES, MAX_OBJ_ELEMENTS, MAX_OBJ_MATERIALS};
 use super::raw_mesh::{Paint, RawMesh};
-use faces::{Faces, Fault, check_count};
+use faces::{FacePlace, Faces, Fault, check_count};
 use glam::{DVec3, Vec2, Vec3};
 use images::Images;
 use libraries::{Libraries, read_libraries};
@@ -142,9 +142,9 @@ impl Statements {
             None => self.material(b"")?,
         };
         self.material = Some(material);
+        let place = FacePlace { line, material };
         let texture_count = self.textures.len();
-        self.faces
-            .add((line, rest), material, &self.positions, texture_count)
+        self.faces.add(place, rest, &self.positions, texture_count)
     }
 
     /// Index of the material that a line names.

@@ -29,6 +29,14 @@ impl Fault {
     }
 }
 
+/// Where a face stands, and of what it is.
+#[derive(Clone, Copy)]
+pub(super) struct FacePlace {
+    /// Number of its line.
+    pub(super) line: usize,
+    pub(super) material: u32,
+}
+
 /// How many vertices and texture coordinates stand above a face.
 #[derive(Clone, Copy)]
 pub(super) struct Counts {
@@ -44,8 +52,7 @@ struct Corner {
 
 /// A face that names vertices below it, and waits for them.
 struct LateFace {
-    line: usize,
-    material: u32,
+    place: FacePlace,
     corner_count: usize,
 }
 
@@ -71,11 +78,11 @@ pub(super) struct Faces {
 }
 
 impl Faces {
-    /// Adds the face of line number `line`, what follows `f` in it.
+    /// Adds a face, whose `text` is what follows `f`; vertices and texture coordinates are those above it.
     pub(super) fn add(
         &mut self,
-        (line, text): (usize, &[u8]),
-        material: u32,
+        place: FacePlace,
+        text: &[u8],
         positions: &[DVec3],
         texture_count: usize,
     ) -> Result<(), Fault> {
@@ -97,15 +104,14 @@ impl Faces {
         }
         let highest = self.corners.iter().map(|corner| corner.position).max();
         if highest.is_some_and(|highest| highest as usize >= positions.len()) {
-            return self.postpone(line, material);
+            return self.postpone(place);
         }
-        self.cut(material, positions)
+        self.cut(place.material, positions)
     }
 
-    fn postpone(&mut self, line: usize, material: u32) -> Result<(), Fault> {
+    fn postpone(&mut self, place: FacePlace) -> Result<(), Fault> {
         self.late.push(LateFace {
-            line,
-            material,
+            place,
             corner_count: self.corners.len(),
         });
         self.late_corners.append(&mut self.corners);
@@ -124,10 +130,10 @@ impl Faces {
                 let number = u64::from(corner.position) + 1;
                 let expected = no_such_vertex(positions.len());
                 let fault = Fault::new(number.to_string().as_bytes(), expected);
-                return Err((face.line, fault));
+                return Err((face.place.line, fault));
             }
-            let cut = self.cut(face.material, positions);
-            cut.map_err(|fault| (face.line, fault))?;
+            let cut = self.cut(face.place.material, positions);
+            cut.map_err(|fault| (face.place.line, fault))?;
         }
         Ok(())
     }
@@ -210,10 +216,18 @@ mod tests {
 
     const SQUARE: [DVec3; 4] = [DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
 
+    fn place(line: usize) -> FacePlace {
+        FacePlace { line, material: 0 }
+    }
+
     #[test]
     fn corners_may_name_vertices_in_four_ways_and_backwards() {
         let mut faces = Faces::default();
-        let mut add = |text: &[u8]| faces.add((1, text), 7, &SQUARE, 2).expect("sound");
+        let place = FacePlace {
+            line: 1,
+            material: 7,
+        };
+        let mut add = |text: &[u8]| faces.add(place, text, &SQUARE, 2).expect("sound");
         add(b"1 2 3 # 4");
         add(b"-4/1 -3/-1/9 3//5");
         add(b"1/ 2// 4/3");
@@ -228,9 +242,9 @@ mod tests {
     #[test]
     fn a_face_may_stand_above_its_vertices_if_they_come() {
         let mut faces = Faces::default();
-        faces.add((1, b"1 2 3 4"), 0, &[], 0).expect("may come");
+        faces.add(place(1), b"1 2 3 4", &[], 0).expect("may come");
         faces
-            .add((2, b"2 3 5"), 1, &SQUARE[..1], 0)
+            .add(place(2), b"2 3 5", &SQUARE[..1], 0)
             .expect("may come");
         let (line, fault) = faces.finish(&SQUARE).expect_err("one never came");
         assert_eq!(faces.triangles, [[0, 1, 2], [0, 2, 3]]);
@@ -251,11 +265,11 @@ mod tests {
             ("1 2 -9223372036854775808", "-9223372036854775808"),
             ("1 2 4294967296", "4294967296"),
         ] {
-            let fault = Faces::default().add((1, text.as_bytes()), 0, &SQUARE, 0);
+            let fault = Faces::default().add(place(1), text.as_bytes(), &SQUARE, 0);
             assert_eq!(fault.expect_err(text).found, found);
         }
         let many = "1 ".repeat(MAX_POLYGON_CORNERS + 1);
-        let fault = Faces::default().add((1, many.as_bytes()), 0, &SQUARE, 0);
+        let fault = Faces::default().add(place(1), many.as_bytes(), &SQUARE, 0);
         assert!(fault.expect_err("too many").expected.contains("16384"));
     }
 }

@@ -146,7 +146,8 @@ struct Word {
     text: Vec<u8>,
 }
 
-/// Splits at white space that is neither quoted nor after a backslash, up to a comment.
+/// Splits at white space that is neither quoted nor after a backslash, up to a comment or more words than all names that
+/// are read can have.
 fn split(line: &[u8]) -> Vec<Word> {
     let mut words: Vec<Word> = Vec::new();
     let mut is_open = false;
@@ -160,7 +161,7 @@ fn split(line: &[u8]) -> Vec<Word> {
             continue;
         }
         if !is_open {
-            if line[k] == b'#' {
+            if line[k] == b'#' || words.len() > MAX_LIBRARIES * MAX_NAME_WORDS {
                 break;
             }
             is_open = true;
