@@ -29,6 +29,7 @@
 //! ```
 
 mod pieces;
+mod whole;
 mod read;
 
 pub use pieces::MAX_PIECE_BYTES;
@@ -165,7 +166,11 @@ struct LevelText {
 struct MeshText {
     scale: f64,
     up: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "whole::some_numbers"
+    )]
     origin: Option<[f64; 3]>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     skip_materials: Vec<String>,
@@ -186,16 +191,38 @@ struct BlockText {
     shape: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     orientation: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "whole::some_numbers"
+    )]
     cell: Option<[f64; 3]>,
-    #[serde(default, rename = "box", skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        rename = "box",
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "whole::some_points"
+    )]
     cuboid: Option<[[f64; 3]; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "whole::some_points"
+    )]
     corners: Option<[[f64; 3]; 8]>,
+    #[serde(deserialize_with = "whole::numbers")]
     albedo: [f32; 3],
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        deserialize_with = "whole::colours"
+    )]
     face_albedo: BTreeMap<String, [f32; 3]>,
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(
+        default,
+        skip_serializing_if = "BTreeMap::is_empty",
+        deserialize_with = "whole::colours"
+    )]
     face_emission: BTreeMap<String, [f32; 3]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     transport: Option<String>,
@@ -441,6 +468,18 @@ mod tests {
             fault("albedo = [0.7", "albedo = [nan"),
             LevelTextError::Level(LevelError::Albedo { .. })
         ));
+        for (from, to) in [
+            ("albedo = [0.7", "albedo = [0.7, 0.7"),
+            ("cell = [0.0", "cell = [0.0, 0.0"),
+            ("connections = [[0", "connections = [[0, 0"),
+            ("\"-x\"]", "\"-x\", 3]"),
+        ] {
+            let longer = fault(from, to);
+            assert!(
+                matches!(longer, LevelTextError::Malformed(_)),
+                "{to}: {longer:?}"
+            );
+        }
         assert!(matches!(
             fault("cell = [0.0, 0.0, 0.0]\n", ""),
             LevelTextError::Placement { found: 0, .. }

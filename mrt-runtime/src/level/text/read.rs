@@ -1,6 +1,7 @@
 //! Reads a level's text piece by piece.
 
 use super::pieces::{List, MAX_PIECE_BYTES, is_table, pieces};
+use super::whole::Whole;
 use super::{
     BlockText, FORMAT, LEVEL_VERSION, LevelTextError, MeshText, read_block, read_face, read_mesh,
 };
@@ -31,9 +32,9 @@ struct Content {
     #[serde(default, rename = "version")]
     _version: u32,
     #[serde(default)]
-    connections: Vec<(usize, String, usize, String)>,
+    connections: Vec<Whole<(usize, String, usize, String)>>,
     #[serde(default)]
-    doors: Vec<(usize, f32)>,
+    doors: Vec<Whole<(usize, f32)>>,
     #[serde(default)]
     mesh: Option<MeshText>,
     #[serde(default, rename = "block")]
@@ -99,7 +100,7 @@ fn add(level: &mut Level, content: Content) -> Result<(), LevelTextError> {
     for block in &content.blocks {
         level.blocks.push(read_block(level.blocks.len(), block)?);
     }
-    for (a, a_face, b, b_face) in &content.connections {
+    for Whole((a, a_face, b, b_face)) in &content.connections {
         let index = level.connections.len();
         let end = |block: usize, face: &str| {
             let face = read_face(face, || format!("connection {index}"))?;
@@ -113,7 +114,7 @@ fn add(level: &mut Level, content: Content) -> Result<(), LevelTextError> {
     let doors = content.doors.iter();
     level
         .doors
-        .extend(doors.map(|&(connection, value)| Door { connection, value }));
+        .extend(doors.map(|&Whole((connection, value))| Door { connection, value }));
     Ok(())
 }
 
