@@ -121,9 +121,9 @@ fn version_1() -> Vec<u8> {
     writer
         .add_numbers("sizes", &[2u32, 2, 2, 2])
         .expect("legal");
-    for shape in 0..2 {
-        let name = format!("{shape}.name");
-        writer.add_text(&name, SHAPES[shape].name).expect("legal");
+    for (index, shape) in SHAPES.iter().enumerate().take(2) {
+        let name = format!("{index}.name");
+        writer.add_text(&name, shape.name).expect("legal");
     }
     for (name, numbers) in sections {
         writer.add_numbers(&name, &numbers).expect("legal");

@@ -163,7 +163,11 @@ fn check_output(args: &LightArgs) -> Result<(), LightCommandError> {
         .into_iter()
         .chain(&args.dictionary);
     let outputs = OutputFiles::new(inputs.map(PathBuf::as_path));
-    outputs.check_folder("--out", &args.out, &["png", "hdr", "obj", "mtl"])?;
+    outputs.check_folder(
+        "--out",
+        &args.out,
+        &["png", "hdr", "ktx2", "glb", "obj", "mtl"],
+    )?;
     Ok(())
 }
 

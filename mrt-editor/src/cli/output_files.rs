@@ -166,7 +166,7 @@ impl OutputFiles {
                 for entry in std::fs::read_dir(folder).map_err(no_file)? {
                     let path = entry.map_err(no_file)?.path();
                     let is_replaced = |ending: &&str| path.extension() == Some(ending.as_ref());
-                    if endings.iter().any(|ending| is_replaced(&ending))
+                    if endings.iter().any(is_replaced)
                         && let Some(identity) = Identity::of(&path)
                     {
                         self.check_identity(flag, &path, &identity)?;

@@ -97,7 +97,10 @@ impl EnergyBound {
         let config = frame.config();
         let waiting = if config.slice.is_some() { 2.0 } else { 1.0 };
         // An infinite tolerance times no pass would be NaN.
-        let tolerance = f64::from(config.tolerance.max(0.0).min(f32::MAX));
+        let tolerance = match config.tolerance > 0.0 {
+            true => f64::from(config.tolerance.min(f32::MAX)),
+            false => 0.0,
+        };
         let kept = 2.0 * tolerance * frame.scene().texel_count() as f64;
         for c in 0..3 {
             self.sent[c] = self.sent[c].max(reflected[c] + emitted[c]);
