@@ -2,6 +2,7 @@
 
 mod args;
 mod error;
+mod unwrapped;
 mod glb;
 mod output;
 mod places;
@@ -32,6 +33,7 @@ use places::{Lamps, Place};
 use report::{Report, lamp_rows, sun_rows};
 use std::path::PathBuf;
 use std::time::Instant;
+use unwrapped::Unwrapped;
 use view::{View, level_origin};
 
 /// Faces that meet at less than this angle look smooth, radians.
@@ -86,7 +88,7 @@ pub fn run(args: &LightArgs) -> Result<(), LightCommandError> {
     };
     let views = view::views(args, &lit, &level, &surroundings)?;
     let unwrapped = unwrap_mesh(mesh, &receivers);
-    let files = output::Unwrapped {
+    let files = Unwrapped {
         triangles: &unwrapped,
         origin: level_origin(&level),
     };

@@ -3,7 +3,7 @@
 //! A changed byte of a container only ever tries its checksums. So changes are made to the parts, and the table and the
 //! checksums are then made to fit: what the sections say is what readers meet.
 
-use super::ChangeBytes;
+use super::target::ChangeBytes;
 use crate::dictionaries::dictionary_format;
 use crate::random::Random;
 

@@ -1,6 +1,7 @@
 //! The committed inputs, and changes of them.
 
-use super::{MAX_INPUT_BYTES, Target, change_bytes, change_tokens};
+use super::random_bytes::{change_bytes, change_tokens};
+use super::target::{MAX_INPUT_BYTES, Target};
 use crate::random::Random;
 use std::path::PathBuf;
 

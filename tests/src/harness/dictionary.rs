@@ -1,7 +1,8 @@
 //! Dictionary files: whatever can be read lights a level.
 
+use super::container_parts::Parts;
 use super::sound::write_pixels;
-use super::{ChangeBytes, MAX_INPUT_BYTES, Parts, Target, measured};
+use super::target::{ChangeBytes, MAX_INPUT_BYTES, Target, measured};
 use crate::random::Random;
 use crate::scenes::COUPLINGS;
 use glam::{DVec3, Vec3};

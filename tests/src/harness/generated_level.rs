@@ -1,7 +1,7 @@
 //! Levels, colours, lights and changes from bytes: frames stay finite, and light never multiplies.
 
 use super::sound::{assert_sound, write_pixels};
-use super::{Target, mutate_plain};
+use super::target::{Target, mutate_plain};
 use crate::dictionaries::mobile_dictionary;
 use crate::flux::Flux;
 use crate::frames::FrameForTests;

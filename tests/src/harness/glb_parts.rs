@@ -1,6 +1,6 @@
 //! A GLB file, taken apart however damaged it is, and put together with lengths that fit.
 
-use super::ChangeBytes;
+use super::target::ChangeBytes;
 use crate::random::Random;
 
 /// The two chunks of a GLB file.

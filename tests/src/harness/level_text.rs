@@ -1,6 +1,6 @@
 //! Levels from text.
 
-use super::{Target, measured, mutate_plain};
+use super::target::{Target, measured, mutate_plain};
 use mrt_runtime::Level;
 
 /// Text that may be a level.

@@ -1,6 +1,6 @@
 //! Reference files: a description, a zero byte, and numbers.
 
-use super::{Target, measured, mutate_plain};
+use super::target::{Target, measured, mutate_plain};
 use mrt_core::reference::bounces::ReferenceBounces;
 use mrt_core::reference::oracle_file::{ReferenceError, ReferenceFile, from_bytes};
 

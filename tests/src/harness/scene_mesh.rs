@@ -1,6 +1,7 @@
 //! Readers of meshes.
 
-use super::{ChangeBytes, GlbParts, MAX_INPUT_BYTES, Target, measured, mutate_plain};
+use super::glb_parts::GlbParts;
+use super::target::{ChangeBytes, MAX_INPUT_BYTES, Target, measured, mutate_plain};
 use crate::random::Random;
 use mrt_editor::import::config::ImportConfig;
 use mrt_editor::import::limits::MAX_COORDINATE_M;

@@ -3,7 +3,7 @@
 
 mod buffer;
 
-use super::output::Unwrapped;
+use super::unwrapped::Unwrapped;
 use crate::import::raw_mesh::Wrap;
 use crate::import::surface_colours::SurfacePaint;
 use crate::render::lit::LitScene;

@@ -2,6 +2,7 @@
 
 use super::glb::glb_bytes;
 use super::report::in_mesh;
+use super::unwrapped::Unwrapped;
 use super::view::View;
 use crate::render::file::{Saves, WriteError, make_folder, stage_hdr, stage_ktx2, stage_png};
 use crate::render::lit::LitScene;
@@ -9,17 +10,9 @@ use crate::render::picture::Picture;
 use crate::render::tone::{auto_exposure, tone_map};
 use glam::{DVec3, Vec3};
 use mrt_core::container::StagedFile;
-use mrt_runtime::low_level::output::receiver::UnwrappedTriangle;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
-
-/// The mesh with its lightmap coordinates.
-pub(super) struct Unwrapped<'a> {
-    pub(super) triangles: &'a [UnwrappedTriangle],
-    /// Where the level's origin is in the mesh, metres.
-    pub(super) origin: DVec3,
-}
 
 /// Writes all files beside their places first, and puts them there once all are on the disk.
 pub(super) fn write(
