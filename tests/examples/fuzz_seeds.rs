@@ -92,7 +92,7 @@ fn bytes_of(dictionary: &Dictionary, storage: Storage) -> Vec<u8> {
 /// A file of version 1: the closed cell and the dead end, two modes of everything, two texels along an edge.
 fn version_1() -> Vec<u8> {
     let mut writer = Writer::new(dictionary_format(1));
-    let mut numbers = |name: &str, count: usize| {
+    let numbers = |name: &str, count: usize| {
         let numbers: Vec<f32> = (0..count).map(|k| 0.1 + 0.01 * k as f32).collect();
         (name.to_owned(), numbers)
     };
