@@ -14,17 +14,17 @@ fn try_target(target: &Target, changes: usize) {
 
 #[test]
 fn dictionaries() {
-    try_target(&dictionary::TARGET, 4000);
+    try_target(&dictionary::TARGET, 20_000);
 }
 
 #[test]
 fn generated_levels() {
-    try_target(&generated_level::TARGET, 1000);
+    try_target(&generated_level::TARGET, 3000);
 }
 
 #[test]
 fn gltf_files() {
-    try_target(&scene_mesh::GLTF, 10_000);
+    try_target(&scene_mesh::GLTF, 20_000);
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn obj_files() {
 
 #[test]
 fn reference_files() {
-    try_target(&reference_file::TARGET, 10_000);
+    try_target(&reference_file::TARGET, 20_000);
 }
 
 /// Committed inputs stay few: a checkout should not grow with every hour of fuzzing.
